@@ -81,9 +81,11 @@ lateral: $(DEVELOP) ## the lateral estimators: affine aircraft, RUNS flights of 
 	for level in 0 1 2; do $(BIN)/python -m studies.lateral_study --runs $(RUNS) --level $$level || exit 1; done
 	$(BIN)/python -m studies.lateral_flights --out $(OUT)/lateral --runs $(RUNS) --jobs $(JOBS)
 	$(BIN)/python -m studies.lateral_causes
+	$(BIN)/python -m studies.measured_lateral
 
 fleet: $(READY) ## 35 aircraft of the JSBSim package surveyed, flown and traced (hours; continues after an interruption)
 	$(BIN)/python -m studies.foreign_fleet --out $(OUT)/fleet
+	$(BIN)/python -m studies.foreign_lateral_calm --out $(OUT)/lateral-fleet
 
 planned: $(DEVELOP) ## planned flights of six pairs of effects, flown and traced (about an hour; continues after an interruption)
 	$(BIN)/python -m studies.planned_flights --out $(OUT)/planned

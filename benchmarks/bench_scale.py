@@ -212,14 +212,14 @@ def _drawn(task: Any, estimated: Callable[[Any], None] = lambda made: None) -> A
     """What identify makes of a log, with estimates drawn at random."""
     from airtruth.identification.estimates import Estimates
     from airtruth.identification.from_log import FromLog
-    from airtruth.identification.result import Source
+    from airtruth.identification.result import LogSource
     from airtruth.logs.digest import sha256_of
     from airtruth.logs.store import read_log
     from airtruth.physics.short_period import Scale
 
     ids = read_log(task.folder / task.entry, columns=[]).run_ids
     rng = np.random.default_rng(len(ids))
-    found = FromLog(ids, Source(task.entry.name, str(sha256_of(task.entry)), len(ids)))
+    found = FromLog(ids, LogSource(task.entry.name, str(sha256_of(task.entry)), len(ids)))
     scale = Scale(*(np.full(len(ids), 1.0) for _ in Scale.__dataclass_fields__))
     first = Estimates(
         method="",

@@ -24,13 +24,13 @@ from airtruth.identification import Options, identify, write_estimates
 from airtruth.logs.remote import location
 from airtruth.logs.store import read_table
 from airtruth.reporting import write_tables
-from airtruth.reporting.loop_figures import traces_page
 from airtruth.reporting.paper.tables import FURTHER, methods_of
 from airtruth.simulation.campaign import plan
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.presentation.overview import write_traces
 from studies import paper_loop
 from studies.campaign_figures import CAMPAIGN_FILES, PAPER, write_figures
+from studies.loop_figures import traces_page
+from studies.traces_overview import write_traces
 
 CAMPAIGNS: Final = ("light", "light-fit", "moderate", "moderate-fit")
 """Campaigns of data/campaigns that the paper's tables show."""

@@ -46,7 +46,6 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
     "physics/sensors": ("tests/physics/test_sensors.py",),
     "physics/actuators": ("tests/physics/test_actuators.py",),
     "physics/gust_figures": ("tests/physics/test_gust_figures.py",),
-    "physics/longitudinal": ("tests/physics/test_longitudinal.py",),
     "physics/dryden": (
         "tests/physics/test_dryden.py",
         "--deselect=tests/physics/test_dryden.py::test_simulated_spectrum",

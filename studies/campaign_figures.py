@@ -18,7 +18,7 @@ from airtruth.logs.flight_log import Batch, batches
 from airtruth.logs.store import log_paths, read_log
 from airtruth.physics import short_period
 from airtruth.reporting import read_campaign
-from airtruth.reporting.paper import distribution, figures, published
+from airtruth.reporting.paper import published
 from airtruth.simulation import manoeuvres
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign.chunk import Pilot
@@ -26,6 +26,8 @@ from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.instruments import LOGGED
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.trim import trim
+from studies import paper_distribution as distribution
+from studies import paper_figures as figures
 
 Array = NDArray[np.float64]
 

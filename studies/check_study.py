@@ -25,7 +25,7 @@ from scipy.stats import f as fisher
 
 from airtruth.checks.kinematics import check_kinematics
 from airtruth.checks.kinematics_fit import fit, limits_of, problem_of
-from airtruth.checks.kinematics_model import ERRORS, Record, thinned
+from airtruth.checks.kinematics_model import ERRORS, LongitudinalSamples, thinned
 from airtruth.checks.kinematics_search import absolute
 from studies import check_flights as flights
 
@@ -83,7 +83,7 @@ def score(seed: int) -> Score:
     return outcome
 
 
-def records_of(trial: flights.Trial) -> list[Record]:
+def records_of(trial: flights.Trial) -> list[LongitudinalSamples]:
     """Records of a trial as the check uses them."""
     channels = trial.log.channels
     names = ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad", "ax_m_s2", "theta_rad")
@@ -91,7 +91,7 @@ def records_of(trial: flights.Trial) -> list[Record]:
     for run, run_id in enumerate(trial.log.run_ids):
         rows = trial.log.rows(run)
         period = float(np.mean(np.diff(trial.log.t_s[rows])))
-        result.append(thinned(Record(run_id, period, *(channels[n][rows] for n in names))))
+        result.append(thinned(LongitudinalSamples(run_id, period, *(channels[n][rows] for n in names))))
     return result
 
 

@@ -22,17 +22,16 @@ from airtruth.aircraft import Aircraft
 from airtruth.identification import Estimates, Options, identify_batch, identify_joint
 from airtruth.logs import store
 from airtruth.logs.flight_log import Batch, batches
-from airtruth.physics.longitudinal import auxiliary, simulate
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import Scale, system
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.simulation.linearise import linearise
-from airtruth.simulation.probe import probe
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG, FT, KT
 from studies.affine_aircraft import affine_copy
+from studies.longitudinal_motion import auxiliary, model_of, simulate
 
 Array = NDArray[np.float64]
 Auxiliary = Callable[[Array, Array, float, Scale], tuple[Array, ...]]
@@ -257,7 +256,7 @@ def calm_table(folder: Path, truth: Array, gtm: Aircraft, at: Trim, level: Level
         for label, (method, options) in estimators(batch, level, gtm).items():
             theta = joint(batch, 1, gtm, method, options)
             print(f"| {log_hz} Hz | {label:18} | {errors(theta, truth)} |", flush=True)
-    model = probe(gtm, at)
+    model = model_of(gtm, at)
     for drift, word in ((1.0, "free"), (0.0, "held")):
         motion = simulate(replace(model, drift=drift), batch.channels["elevator_rad"], batch.dt_s)
         made = {
@@ -284,7 +283,7 @@ def growth_table(folder: Path, truth: Array, gtm: Aircraft, runs: int, level: Le
 
 def auxiliary_table(gtm: Aircraft, at: Trim, truth: Array, runs: int, gust: float) -> None:
     """Linear against nonlinear auxiliary model."""
-    model = probe(gtm, at)
+    model = model_of(gtm, at)
     calm = fly(gtm.folder, Level(0.0, 0.0, 0.0), 1, 1)
     batch = fly(gtm.folder, Level(0.0, gust, 1.0), runs, 11)
     surface = calm.channels["elevator_rad"]

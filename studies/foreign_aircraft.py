@@ -22,15 +22,15 @@ from airtruth.aircraft import Aircraft
 from airtruth.identification import Options, identify_batch
 from airtruth.logs import store
 from airtruth.logs.flight_log import Batch, batches
-from airtruth.physics.longitudinal import Longitudinal, simulate
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.probe import grid_about, probe
+from airtruth.simulation.probe import grid_about
 from airtruth.simulation.simulator import Condition, Executive
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG, INCH
+from studies.longitudinal_motion import Longitudinal, model_of, simulate
 
 Array = NDArray[np.float64]
 Edit = Callable[[ET.Element], None]
@@ -258,7 +258,7 @@ def main() -> None:
         print("\n" + HEADER + " |\n|---|---|---|---|---|---|")
         for name, reach in (("c172x", 4.0), ("f16", 3.0)):
             flown = first[name]
-            model = probe(
+            model = model_of(
                 flown.aircraft, flown.trim, grid_about(flown.trim, reach * DEG, reach * DEG, 24.0 * DEG)
             )
             for drift, word in ((1.0, "free"), (0.0, "held")):

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from airtruth.identification import Options, identify_batch
-from airtruth.identification.lateral.observation import Observation, observe
+from airtruth.identification.lateral.observation import LateralObservation, observe
 from airtruth.identification.lateral.problems import instruments, rate_of, with_corners
 from airtruth.identification.lateral.solve import solution
 from airtruth.logs.flight_log import batches
@@ -135,7 +135,7 @@ def dynamic(order: int) -> Callable[..., Estimate]:
     return estimate
 
 
-def _filtered(o: Observation, theta: np.ndarray, run: int, order: int) -> np.ndarray:
+def _filtered(o: LateralObservation, theta: np.ndarray, run: int, order: int) -> np.ndarray:
     """One iteration for a run: theta (1, 15)."""
     one = np.array([run])
     scale = type(o.scale)(*(getattr(o.scale, name)[one] for name in o.scale.__dataclass_fields__))

@@ -33,7 +33,7 @@ from airtruth.identification.lateral.observation import observe
 from airtruth.identification.lateral.problems import ls_problem, smoothed
 from airtruth.identification.likelihood.fit import Records, joint_maximum
 from airtruth.identification.likelihood.kalman import score
-from airtruth.identification.likelihood.kalman_kernel import Signals
+from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
 from airtruth.identification.likelihood.predictor import Predictor, Term, layout
 from airtruth.identification.likelihood.scoring import Search
 from airtruth.importers.sources import open_source
@@ -251,7 +251,7 @@ def fitted(model: Predictor, y: Array, u: Array, dt_s: float, ends: Sequence[int
     records = []
     for a, b in itertools.pairwise(ends):
         own_u = u[None, a:b] - u[a]
-        signals = Signals(y[None, a:b] - y[a], own_u, np.zeros_like(own_u))
+        signals = KalmanSignals(y[None, a:b] - y[a], own_u, np.zeros_like(own_u))
         records.append(Records(dt_s, signals, layout(model, 1), SimpleNamespace()))
     count = len(model.parameters) - len(model.logarithmic)
     own = model.parameters[:count]

@@ -29,8 +29,6 @@ from airtruth.logs.store import log_paths, read_log, read_table, write_table
 from airtruth.loop import identify_without_effects
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting import read_campaign
-from airtruth.reporting.loop import WITH_EFFECTS, LoopTable, evaluate, without, write_loop
-from airtruth.reporting.loop_figures import bias_figure
 from airtruth.reporting.paper.tables import FURTHER
 from airtruth.simulation.campaign import plan as planning
 from airtruth.simulation.campaign import run as flying
@@ -38,6 +36,8 @@ from airtruth.tracing import TraceOptions, TraceResult, trace
 from airtruth.tracing.compensate import Compensation, compensation_of
 from airtruth.tracing.presentation.text import effect_line, verdict
 from studies.affine_aircraft import affine_copy
+from studies.loop_figures import bias_figure
+from studies.loop_report import WITH_EFFECTS, LoopTable, evaluate, without, write_loop
 
 ROOT = Path(__file__).resolve().parents[1]
 CAMPAIGN = ROOT / "data" / "campaigns" / "light-fit.toml"

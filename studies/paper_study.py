@@ -27,7 +27,7 @@ from airtruth.logs.store import read_table, write_table
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting.campaign import read_campaign
 from airtruth.reporting.paper.comparison import RUNS, together
-from airtruth.reporting.paper.tables import TABLES, Entry, PaperTable, evaluate
+from airtruth.reporting.paper.tables import TABLES, PaperEntry, PaperTable, evaluate
 from airtruth.table import Row, Table, as_markdown, flat
 from airtruth.units import DEG, G0
 from studies.affine_aircraft import affine_copy
@@ -90,7 +90,7 @@ def tables_of(study: Study, case: Case, methods: Sequence[str] = ()) -> list[Pap
     return [evaluate(TABLES[name], campaign) for name in PRINTED_COLUMNS[case.level]]
 
 
-def entry(tables: Sequence[PaperTable], method: str, parameter: str, statistic: str) -> Entry:
+def entry(tables: Sequence[PaperTable], method: str, parameter: str, statistic: str) -> PaperEntry:
     """Return a number of the first table that has it."""
     return next(t.entries[k] for t in tables if (k := (method, parameter, statistic)) in t.entries)
 
@@ -114,7 +114,7 @@ def misfit(tables: Sequence[PaperTable], level: str, only: Sequence[str]) -> tup
     return result[0], result[1]
 
 
-def shown(e: Entry) -> str:
+def shown(e: PaperEntry) -> str:
     """Return value ± standard error with two digits of the error; the value alone where there is no error."""
     if not math.isfinite(e.se) or e.se <= 0.0:
         return f"{e.value:.4g}"

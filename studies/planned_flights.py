@@ -37,7 +37,7 @@ from airtruth.api.plans import base_campaign
 from airtruth.design import Limits, PlanOptions, split
 from airtruth.design.limits import extremes
 from airtruth.design.question import from_names
-from airtruth.design.separation import Experiment, Member, Model
+from airtruth.design.separation import Experiment, FilterSetting, Member
 from airtruth.design.splitting import reference_separation
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
@@ -229,7 +229,7 @@ def effect_table(effect: Effect, values: dict[str, float]) -> dict[str, Any]:
 def misfit(case: Case, member: Member, gust_m_s: float) -> float:
     """Square of the innovations of the first record beyond everything that is refitted, sizes included [-]."""
     record = case.fitted.records[0]
-    model = Model(case.fitted.settings, case.hypothesis.declared, gust_m_s, 1)
+    model = FilterSetting(case.fitted.settings, case.hypothesis.declared, gust_m_s, 1)
     experiment = Experiment(model, record)
     located = np.array([1.0 if p.is_location and p.unit == "rad" else 0.0 for p in member.effect.parameters])
     starts = [member.sizes + shift * located for shift in (LOCATIONS if located.any() else (0.0,))]

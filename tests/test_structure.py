@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -155,3 +156,13 @@ def test_docstrings_begin_with_a_noun_or_a_verb(path):
     """A docstring names its subject: no noun clause (What the filter reads) and no bare genitive (Of a problem)."""
     clauses = re.findall(r'"""(?:What|Of) [^\n]*', path.read_text(encoding="utf-8"))
     assert not clauses
+
+
+def test_each_class_has_a_name_of_its_own():
+    defined = Counter(
+        node.name
+        for path in FILES
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ClassDef)
+    )
+    assert [name for name, count in defined.items() if count > 1] == []

@@ -13,7 +13,7 @@ from airtruth import units
 
 
 @dataclass(frozen=True)
-class Signal:
+class LogChannel:
     """One channel of a flight log.
 
     Attributes
@@ -38,10 +38,12 @@ class Signal:
 
 
 _LONGITUDINAL = (
-    Signal("airspeed_m_s", "m/s", "speed", "true airspeed", "velocities/vt-fps", units.FT, 1000.0),
-    Signal("alpha_rad", "rad", "angle", "angle of attack, nose-up positive", "aero/alpha-rad", 1.0, 1.6),
-    Signal("theta_rad", "rad", "angle", "pitch attitude, nose-up positive", "attitude/theta-rad", 1.0, 1.6),
-    Signal(
+    LogChannel("airspeed_m_s", "m/s", "speed", "true airspeed", "velocities/vt-fps", units.FT, 1000.0),
+    LogChannel("alpha_rad", "rad", "angle", "angle of attack, nose-up positive", "aero/alpha-rad", 1.0, 1.6),
+    LogChannel(
+        "theta_rad", "rad", "angle", "pitch attitude, nose-up positive", "attitude/theta-rad", 1.0, 1.6
+    ),
+    LogChannel(
         "q_rad_s",
         "rad/s",
         "angular_rate",
@@ -50,8 +52,8 @@ _LONGITUDINAL = (
         1.0,
         10.0,
     ),
-    Signal("ax_m_s2", "m/s2", "acceleration", "specific force along body x (forward)", "", 1.0, 200.0),
-    Signal(
+    LogChannel("ax_m_s2", "m/s2", "acceleration", "specific force along body x (forward)", "", 1.0, 200.0),
+    LogChannel(
         "az_m_s2",
         "m/s2",
         "acceleration",
@@ -60,7 +62,7 @@ _LONGITUDINAL = (
         1.0,
         200.0,
     ),
-    Signal(
+    LogChannel(
         "elevator_rad",
         "rad",
         "angle",
@@ -69,7 +71,7 @@ _LONGITUDINAL = (
         1.0,
         1.6,
     ),
-    Signal(
+    LogChannel(
         "elevator_command_rad",
         "rad",
         "angle",
@@ -78,9 +80,9 @@ _LONGITUDINAL = (
         1.0,
         1.6,
     ),
-    Signal("throttle", "-", "ratio", "throttle lever, 0 to 1", "", 1.0, 1.0),
-    Signal("altitude_m", "m", "length", "pressure altitude", "position/h-sl-ft", units.FT, 30000.0),
-    Signal(
+    LogChannel("throttle", "-", "ratio", "throttle lever, 0 to 1", "", 1.0, 1.0),
+    LogChannel("altitude_m", "m", "length", "pressure altitude", "position/h-sl-ft", units.FT, 30000.0),
+    LogChannel(
         "density_kg_m3",
         "kg/m3",
         "density",
@@ -91,8 +93,10 @@ _LONGITUDINAL = (
     ),
 )
 _LATERAL = (
-    Signal("beta_rad", "rad", "angle", "sideslip, wind from the right positive", "aero/beta-rad", 1.0, 1.6),
-    Signal(
+    LogChannel(
+        "beta_rad", "rad", "angle", "sideslip, wind from the right positive", "aero/beta-rad", 1.0, 1.6
+    ),
+    LogChannel(
         "p_rad_s",
         "rad/s",
         "angular_rate",
@@ -101,7 +105,7 @@ _LATERAL = (
         1.0,
         10.0,
     ),
-    Signal(
+    LogChannel(
         "r_rad_s",
         "rad/s",
         "angular_rate",
@@ -111,10 +115,10 @@ _LATERAL = (
         10.0,
     ),
     # of the angles of bank and heading whole turns are added up where they jump
-    Signal("phi_rad", "rad", "angle", "bank, right wing down positive", "attitude/phi-rad"),
-    Signal("psi_rad", "rad", "angle", "heading, nose right positive", "attitude/psi-rad"),
-    Signal("ay_m_s2", "m/s2", "acceleration", "specific force along body y (right)", "", 1.0, 200.0),
-    Signal(
+    LogChannel("phi_rad", "rad", "angle", "bank, right wing down positive", "attitude/phi-rad"),
+    LogChannel("psi_rad", "rad", "angle", "heading, nose right positive", "attitude/psi-rad"),
+    LogChannel("ay_m_s2", "m/s2", "acceleration", "specific force along body y (right)", "", 1.0, 200.0),
+    LogChannel(
         "aileron_rad",
         "rad",
         "angle",
@@ -123,8 +127,8 @@ _LATERAL = (
         1.0,
         1.6,
     ),
-    Signal("rudder_rad", "rad", "angle", "rudder surface, trailing edge left positive", "", 1.0, 1.6),
-    Signal(
+    LogChannel("rudder_rad", "rad", "angle", "rudder surface, trailing edge left positive", "", 1.0, 1.6),
+    LogChannel(
         "aileron_command_rad",
         "rad",
         "angle",
@@ -133,7 +137,7 @@ _LATERAL = (
         1.0,
         1.6,
     ),
-    Signal(
+    LogChannel(
         "rudder_command_rad",
         "rad",
         "angle",
@@ -144,7 +148,7 @@ _LATERAL = (
     ),
 )
 
-SIGNALS: Final[dict[str, Signal]] = {s.name: s for s in (*_LONGITUDINAL, *_LATERAL)}
+SIGNALS: Final[dict[str, LogChannel]] = {s.name: s for s in (*_LONGITUDINAL, *_LATERAL)}
 """Column name -> channel, in the order of the columns of a log (contract 1)."""
 LATERAL: Final = tuple(s.name for s in _LATERAL)
 """Channels of the lateral-directional motion; every log may lack all of them."""

@@ -29,7 +29,7 @@ import numpy as np
 from airtruth import aircraft as planes
 from airtruth.api.plans import base_campaign
 from airtruth.design import PlanOptions, SplitResult
-from airtruth.design.from_files import Stated, planned_from
+from airtruth.design.from_files import Request, planned_from
 from airtruth.design.question import MOST, is_separable
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import AirtruthError
@@ -90,7 +90,7 @@ def flown_and_traced(trial: draw.Trial, first_log: Path, folder: Path, seed: int
     """The planned flight of one trial, its separations, and the answer to both flights."""
     gtm = planes.load("gtm")
     result = planned_from(
-        campaign_in(trial.air), Stated(trace=folder / "trace.json"), None, PlanOptions(seed=seed)
+        campaign_in(trial.air), Request(trace=folder / "trace.json"), None, PlanOptions(seed=seed)
     )
     assert isinstance(result, SplitResult)
     write_text(folder / "next.toml", result.to_toml())

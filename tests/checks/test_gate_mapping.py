@@ -16,7 +16,7 @@ from airtruth.errors import LogError
 from airtruth.identification import identify
 from airtruth.logs.flight_log import PRESCRIBED, FlightLog
 from airtruth.logs.store import iter_logs, read_log
-from airtruth.physics.reconstruction import COLUMNS, Priors, reconstruct
+from airtruth.physics.reconstruction import COLUMNS, ReconstructionPriors, reconstruct
 from airtruth.simulation.campaign import run as campaign
 from airtruth.units import DEG, G0
 
@@ -180,7 +180,7 @@ def vaneless(log, airspeed, theta):
     for run in range(len(log)):
         rows = log.rows(run)
         own = {n: v[rows] for n, v in channels.items()}
-        one = reconstruct(own, 0.02, Priors(0.02 * G0, 0.1 * DEG, 0.02))
+        one = reconstruct(own, 0.02, ReconstructionPriors(0.02 * G0, 0.1 * DEG, 0.02))
         made["alpha_rad"][rows] = one.alpha_rad
         for name, values in zip(COLUMNS, one.directions_rad, strict=True):
             made[name][rows] = values

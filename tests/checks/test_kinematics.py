@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 from airtruth.checks.kinematics import check_kinematics
 from airtruth.checks.kinematics_fit import Fit, fit, limits_of, problem_of
 from airtruth.checks.kinematics_lines import lines_of
-from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, Record, compare, stacked
+from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, LongitudinalSamples, compare, stacked
 from airtruth.checks.kinematics_record import declared_biases, declared_errors
-from airtruth.checks.kinematics_search import Explanation
+from airtruth.checks.kinematics_search import ErrorSet
 from airtruth.checks.kinematics_words import _factors
-from airtruth.checks.result import Cause, CheckResult, Finding, tables, undetermined
+from airtruth.checks.result import CheckResult, Finding, PossibleCause, tables, undetermined
 from airtruth.checks.samples import derivative, earlier, integral, lagged
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
@@ -98,7 +98,7 @@ def as_log(*parts, leave_out=()):
 
 
 def record(c):
-    return Record(
+    return LongitudinalSamples(
         "r", DT, c["airspeed_m_s"], c["alpha_rad"], c["q_rad_s"], c["az_m_s2"], c["elevator_rad"],
         c["ax_m_s2"], c["theta_rad"],
     )  # fmt: skip
@@ -178,7 +178,7 @@ def test_records_of_one_length_are_compared_as_one(true):
     one = record(true)
     other = record({n: x[::-1].copy() for n, x in true.items()})
     longer = record({n: np.concatenate([x, x]) for n, x in true.items()})
-    lacking = Record("r", DT, one.airspeed, one.alpha, one.q, one.az, one.elevator, one.ax)
+    lacking = LongitudinalSamples("r", DT, one.airspeed, one.alpha, one.q, one.az, one.elevator, one.ax)
     records = [one, longer, other, lacking]
     every = stacked(records)
     assert [numbers for numbers, _ in every] == [(0, 2), (1,), (3,)]
@@ -485,10 +485,10 @@ def test_no_set_of_errors_is_excluded_for_its_size_alone():
     """Distances by hand: 9.6 by the cost, of which 3.3 is the improbability of a long arm."""
     empty = np.zeros(0)
     fitted = Fit((), empty, empty, np.zeros((0, 0)), 0.0, True)
-    best = Explanation(fitted, cost=20.0, improbability=0.1)
-    long_arm = Explanation(fitted, cost=29.6, improbability=3.4)
+    best = ErrorSet(fitted, cost=20.0, improbability=0.1)
+    long_arm = ErrorSet(fitted, cost=29.6, improbability=3.4)
     assert long_arm.behind(best) == pytest.approx(9.6 - 3.3)
-    assert Explanation(fitted, cost=21.0, improbability=0.0).behind(best) == pytest.approx(1.0)
+    assert ErrorSet(fitted, cost=21.0, improbability=0.0).behind(best) == pytest.approx(1.0)
 
 
 def test_combinations_are_two_lists():
@@ -506,8 +506,8 @@ def test_an_error_without_a_size_of_its_own_has_no_row_of_numbers():
     arm = Finding("vane_arm", "m", "position", 0.36, 1.14, -1.6, 1.9, 0.0, 5.2, "one of")
     lag = Finding("vane_lag", "s", "lag", 0.054, 0.012, 0.037, 0.088, 0.0, 0.021, "one of")
     causes = (
-        Cause((replace(lag, std=0.006),), 5.0, 0.0, True),
-        Cause((replace(arm, value=1.76, std=0.19),), 11.0, 6.0, True),
+        PossibleCause((replace(lag, std=0.006),), 5.0, 0.0, True),
+        PossibleCause((replace(arm, value=1.76, std=0.19),), 11.0, 6.0, True),
     )
     result = CheckResult("one_of", ("r1",), (arm, lag), causes, 60.0, 70, 0.8, 1.0, {}, ("One of several.",))
     assert undetermined(result) == ("vane_arm",)

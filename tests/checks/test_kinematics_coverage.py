@@ -9,7 +9,7 @@ from scipy.stats import t as student
 from airtruth.checks.kinematics import check_kinematics
 from airtruth.checks.kinematics_bias import ramps
 from airtruth.checks.kinematics_fit import fit, limits_of, problem_of
-from airtruth.checks.kinematics_model import Record, thinned
+from airtruth.checks.kinematics_model import LongitudinalSamples, thinned
 from airtruth.logs.store import iter_logs
 from airtruth.simulation.campaign import run as campaign
 
@@ -59,7 +59,7 @@ def flown(folder, **settings):
 def records(logs):
     names = ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad", "ax_m_s2", "theta_rad")
     return [
-        thinned(Record(run_id, 0.02, *(log.channels[n][log.rows(run)] for n in names)))
+        thinned(LongitudinalSamples(run_id, 0.02, *(log.channels[n][log.rows(run)] for n in names)))
         for log in logs
         for run, run_id in enumerate(log.run_ids)
     ]

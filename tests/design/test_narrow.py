@@ -17,7 +17,7 @@ from airtruth.cli.completion import complete_derivative
 from airtruth.design import BandQuestion, DerivativeQuestion, PlanOptions, forecast
 from airtruth.design import search as searching
 from airtruth.design.bench import Bench
-from airtruth.design.from_files import Stated, planned_from
+from airtruth.design.from_files import Request, planned_from
 from airtruth.design.information import LinearExperiment
 from airtruth.design.limits import Limits
 from airtruth.design.separation import flown_by
@@ -242,9 +242,9 @@ def test_names_that_are_no_derivatives_are_refused(names, words):
 
 def test_one_flight_has_one_aim():
     with pytest.raises(ConfigurationError, match="--split and --derivative exclude"):
-        planned_from(None, Stated(("vane_lag", "gyro_lag"), {}, ("Cmq",)), "gtm", PlanOptions())
+        planned_from(None, Request(("vane_lag", "gyro_lag"), {}, ("Cmq",)), "gtm", PlanOptions())
     with pytest.raises(ConfigurationError, match="--size applies to effects"):
-        planned_from(None, Stated((), {"vane_lag.tau_s": 0.1}, ("Cmq",)), "gtm", PlanOptions())
+        planned_from(None, Request((), {"vane_lag.tau_s": 0.1}, ("Cmq",)), "gtm", PlanOptions())
 
 
 def test_names_of_derivatives_are_completed():

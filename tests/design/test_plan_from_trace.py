@@ -55,7 +55,7 @@ def planned(monkeypatch):
     def ask(folder, out=None):
         with pytest.raises(ConfigurationError, match="no search"):
             from_files.planned_from(
-                None, from_files.Stated(derivatives=("Cmq",), trace=folder), None, PlanOptions(), out
+                None, from_files.Request(derivatives=("Cmq",), trace=folder), None, PlanOptions(), out
             )
         return given[-1]
 
@@ -96,7 +96,7 @@ def test_an_aircraft_that_changed_since_is_refused(tmp_path, own):
         ConfigurationError, match=r"aircraft\.toml is not the file of the trace; state --aircraft"
     ):
         from_files.planned_from(
-            None, from_files.Stated(derivatives=("Cmq",), trace=folder), None, PlanOptions()
+            None, from_files.Request(derivatives=("Cmq",), trace=folder), None, PlanOptions()
         )
 
 
@@ -122,7 +122,7 @@ def test_an_aircraft_without_a_model_flies_in_the_form_that_its_trace_wrote(tmp_
 def test_an_aircraft_without_a_model_is_told_so_before_a_campaign_is_asked_for(tmp_path):
     """A campaign would be refused in the next step."""
     shutil.copy(aircraft.load("gtm").folder / "aircraft.toml", tmp_path)
-    stated = from_files.Stated(derivatives=("Cmq",))
+    stated = from_files.Request(derivatives=("Cmq",))
     with pytest.raises(
         AircraftError, match=r"has no JSBSim model to fly.*`airtruth aircraft new` writes one"
     ):
@@ -131,4 +131,4 @@ def test_an_aircraft_without_a_model_is_told_so_before_a_campaign_is_asked_for(t
 
 def test_a_condition_is_asked_for_with_every_option(tmp_path):
     with pytest.raises(ConfigurationError, match="--aircraft gtm --eas-kt SPEED --altitude-ft ALTITUDE"):
-        from_files.planned_from(None, from_files.Stated(derivatives=("Cmq",)), "gtm", PlanOptions(), None)
+        from_files.planned_from(None, from_files.Request(derivatives=("Cmq",)), "gtm", PlanOptions(), None)

@@ -19,7 +19,7 @@ from airtruth.design.criterion import criterion
 from airtruth.design.flight import PlanOptions
 from airtruth.design.limits import Limits
 from airtruth.design.question import from_names
-from airtruth.design.separation import Experiment, Member, Model
+from airtruth.design.separation import Experiment, FilterSetting, Member
 from airtruth.design.split_result import split_probability
 from airtruth.design.verdict import asked_by
 from airtruth.design.waveforms import multistep
@@ -47,7 +47,7 @@ def bench(gtm):
 
 @pytest.fixture(scope="module")
 def model(gtm):
-    return Model(settings_of(gtm, 0.05), declared_change(gtm), 0.3, 1)
+    return FilterSetting(settings_of(gtm, 0.05), declared_change(gtm), 0.3, 1)
 
 
 def flown(bench, unit=0.3, sign=1.0):

@@ -5,14 +5,14 @@ import pytest
 
 import airtruth as at
 from airtruth.errors import ConfigurationError
-from airtruth.exporting.model import SYSTEMS, LateralPoint, LinearModel
+from airtruth.exporting.model import SYSTEMS, LateralFlightPoint, LinearModel
 from airtruth.identification import identify, write_estimates
 from airtruth.physics.motion import LATERAL
 from airtruth.units import G0
 from validation.affine_lateral import ALPHA, DENSITY, GTM, SPEED, THETA, fly, log_of, pitching
 
 PITCH = 0.08
-POINT = LateralPoint(
+POINT = LateralFlightPoint(
     SPEED,
     DENSITY,
     GTM.wing_area_m2,

@@ -7,7 +7,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are
 from airtruth.errors import ConfigurationError
 from airtruth.identification.likelihood.cramer_rao import bound
 from airtruth.identification.likelihood.kalman import score
-from airtruth.identification.likelihood.kalman_kernel import Signals
+from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
 from airtruth.identification.likelihood.predictor import Term, extended, layout, short_period
 from validation.linear_flight import LIGHT, NOISE, THETA, fly, gtm_scale
 
@@ -52,7 +52,7 @@ def start_z(p, theta=THETA * 1.1):
 
 
 def evaluate(p, z, free, y, u, bend):
-    made = score(layout(p, 1), np.array([0]), z[None], free, Signals(y[None], u[None], bend[None]), DT)
+    made = score(layout(p, 1), np.array([0]), z[None], free, KalmanSignals(y[None], u[None], bend[None]), DT)
     return tuple(part[0] for part in made)
 
 
@@ -164,7 +164,7 @@ def test_bound_is_that_of_the_dense_gaussian(start):
     across = rows.T @ weighted[:, free.size :]
     normal = columns.T @ weighted[:, free.size :]
     expected = np.linalg.inv(information - across @ np.linalg.solve(normal, across.T))
-    signals = Signals(np.empty((1, len(u), 3)), u[None], bend[None])
+    signals = KalmanSignals(np.empty((1, len(u), 3)), u[None], bend[None])
     got = bound(layout(p, 1), 0, z, free, signals, DT, start, np.arange(2))
     np.testing.assert_allclose(np.sqrt(np.diag(got)), np.sqrt(np.diag(expected)), rtol=1e-5)
 

@@ -10,7 +10,7 @@ from airtruth.importers import import_log
 from airtruth.importers.mapping import MappingFile
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import read_log, write_log
-from airtruth.physics.reconstruction import COLUMNS, Priors, reconstruct
+from airtruth.physics.reconstruction import COLUMNS, ReconstructionPriors, reconstruct
 
 DEG = np.pi / 180.0
 UNITS = {
@@ -94,7 +94,7 @@ def test_exact_motion_is_reconstructed():
     gamma = c["theta_rad"] - c["alpha_rad"]
     rate = -(force + 9.80665 * np.cos(gamma)) / c["airspeed_m_s"]
     np.testing.assert_allclose(rate, np.gradient(gamma, 0.01, edge_order=2), atol=2e-5)
-    made = reconstruct(c, 0.01, Priors(0.1, 0.003, 0.02))
+    made = reconstruct(c, 0.01, ReconstructionPriors(0.1, 0.003, 0.02))
     np.testing.assert_allclose(made.alpha_rad, c["alpha_rad"], atol=2e-5)
 
 
@@ -110,7 +110,7 @@ def test_errors_of_instruments_stay_within_the_directions():
         c["airspeed_m_s"] = c["airspeed_m_s"] * (1.0 + 0.02 * rng.normal())
         c["altitude_m"] = c["altitude_m"] + 0.3 * rng.normal(size=len(truth))
         c["theta_rad"] = c["theta_rad"] + 0.002 * rng.normal(size=len(truth))
-        made = reconstruct(c, 0.01, Priors(0.1, 0.003, 0.02))
+        made = reconstruct(c, 0.01, ReconstructionPriors(0.1, 0.003, 0.02))
         error = made.alpha_rad - truth
         at = [100, 600, 1100]
         change = error[at] - error.mean()

@@ -13,11 +13,11 @@ import pytest
 from airtruth.errors import StoreError
 from airtruth.isolation import client
 from airtruth.isolation.interpreter import environment
-from airtruth.isolation.limits import LEAST_MEMORY_BYTES, Limits, limits_of
+from airtruth.isolation.limits import LEAST_MEMORY_BYTES, ProcessLimits, limits_of
 from airtruth.isolation.protocol import IsolatedError, Task, UnforeseenError
 
 HERE = Path(__file__).parent
-SHORT = Limits(seconds=1.0, memory_bytes=LEAST_MEMORY_BYTES)
+SHORT = ProcessLimits(seconds=1.0, memory_bytes=LEAST_MEMORY_BYTES)
 
 
 @pytest.fixture(autouse=True)
@@ -96,7 +96,7 @@ def test_an_interrupted_call_does_not_spoil_the_next():
     signal.setitimer(signal.ITIMER_REAL, 0.3)
     try:
         with pytest.raises(KeyboardInterrupt):
-            call("sleep", Limits(30.0, LEAST_MEMORY_BYTES))
+            call("sleep", ProcessLimits(30.0, LEAST_MEMORY_BYTES))
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from airtruth.numerics.levenberg_marquardt import Status, minimise
-from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
+from airtruth.numerics.levenberg_marquardt import SolverStatus, minimise
+from airtruth.numerics.levenberg_marquardt_options import Damping, SolverOptions, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
 
 T_MEYER = 45.0 + 5.0 * np.arange(1, 17)
@@ -65,19 +65,19 @@ class LeastSquares:
 def test_meyers_problem():
     """Published minimum: sum of squares 87.9458. The valley is narrow: small factors follow it best."""
     damping = Damping(rejected=2.0, poor=2.0, good=1.0 / 3.0)
-    options = Options(500, damping, Stopping(undamped=1e-8))
+    options = SolverOptions(500, damping, Stopping(undamped=1e-8))
     found = minimise(LeastSquares(meyer), np.array([[0.02, 4000.0, 250.0]]), options)
-    assert found.status == (Status.CONVERGED,)
+    assert found.status == (SolverStatus.CONVERGED,)
     assert 2.0 * found.at[0].cost == pytest.approx(87.9458, abs=1e-4)
     np.testing.assert_allclose(found.x[0], [0.00560964, 6181.35, 345.224], rtol=1e-5)
 
 
 @pytest.mark.parametrize("reuse", [False, True])
 def test_rosenbrocks_valley(reuse):
-    options = Options(300, stopping=Stopping(promised=1e-14), reuse=reuse, stale=1e-2, chords=3 * reuse)
+    options = SolverOptions(300, stopping=Stopping(promised=1e-14), reuse=reuse, stale=1e-2, chords=3 * reuse)
     problems = LeastSquares(rosenbrock)
     found = minimise(problems, np.array([[-1.2, 1.0]]), options)
-    assert found.status == (Status.CONVERGED,)
+    assert found.status == (SolverStatus.CONVERGED,)
     np.testing.assert_allclose(found.x[0], 1.0, atol=1e-6)
     assert (problems.reused > 0) == reuse
 
@@ -85,9 +85,9 @@ def test_rosenbrocks_valley(reuse):
 def test_side_by_side_is_one_by_one():
     """Each problem has a damping, a status and a count of its own."""
     starts = np.array([[-1.2, 1.0], [3.0, -2.0], [0.5, 0.5], [np.nan, 0.0]])
-    options = Options(60, stopping=Stopping(1e-14))
+    options = SolverOptions(60, stopping=Stopping(1e-14))
     together = minimise(LeastSquares(rosenbrock), starts, options)
-    assert together.status == (*[Status.CONVERGED] * 3, Status.FAILED)
+    assert together.status == (*[SolverStatus.CONVERGED] * 3, SolverStatus.FAILED)
     for i in range(3):
         alone = minimise(LeastSquares(rosenbrock), starts[i : i + 1], options)
         np.testing.assert_allclose(alone.x[0], together.x[i], rtol=1e-12)
@@ -100,7 +100,7 @@ def test_a_quadratic_takes_one_undamped_step():
     rng = np.random.default_rng(1)
     a, b = rng.standard_normal((8, 3)), rng.standard_normal(8)
     problems = LeastSquares(lambda x: (a @ x - b, a))
-    found = minimise(problems, np.zeros((1, 3)), Options(10, stopping=Stopping(undamped=1e9)))
+    found = minimise(problems, np.zeros((1, 3)), SolverOptions(10, stopping=Stopping(undamped=1e9)))
     np.testing.assert_allclose(found.x[0], np.linalg.lstsq(a, b, rcond=None)[0], rtol=1e-10)
     assert found.iterations == (1,)
 
@@ -109,7 +109,7 @@ def test_bounds_are_those_of_the_caller():
     found = minimise(
         LeastSquares(rosenbrock, (-2.0, 0.5)),
         np.array([[0.0, 0.0]]),
-        Options(50, stopping=Stopping(decrease=1e-12)),
+        SolverOptions(50, stopping=Stopping(decrease=1e-12)),
     )
     assert found.x[0, 0] == 0.5
 
@@ -122,8 +122,8 @@ def test_no_step_lowers_the_cost():
             steps, promised = super().step(x, at, damping, index)
             return -steps, promised
 
-    found = minimise(Wrong(rosenbrock), np.array([[-1.2, 1.0]]), Options(100, Damping(most=1e3)))
-    assert found.status == (Status.STALLED,)
+    found = minimise(Wrong(rosenbrock), np.array([[-1.2, 1.0]]), SolverOptions(100, Damping(most=1e3)))
+    assert found.status == (SolverStatus.STALLED,)
     np.testing.assert_array_equal(found.x[0], [-1.2, 1.0])
 
 
@@ -137,22 +137,22 @@ def test_a_step_that_cannot_be_computed_ends_its_search_alone():
     found = minimise(
         Singular(rosenbrock),
         np.array([[-1.2, 1.0], [2.0, 2.0]]),
-        Options(60, stopping=Stopping(decrease=1e-14)),
+        SolverOptions(60, stopping=Stopping(decrease=1e-14)),
     )
-    assert found.status == (Status.CONVERGED, Status.SINGULAR)
+    assert found.status == (SolverStatus.CONVERGED, SolverStatus.SINGULAR)
 
 
 def test_a_rival_out_of_reach_ends_a_search():
-    options = Options(100, stopping=Stopping(1e-14), outrun=1e-3)
+    options = SolverOptions(100, stopping=Stopping(1e-14), outrun=1e-3)
     found = minimise(LeastSquares(meyer), np.array([[0.02, 4000.0, 250.0]]), options, rival=-1e30)
-    assert found.status == (Status.OUTRUN,)
+    assert found.status == (SolverStatus.OUTRUN,)
 
 
 def test_a_step_with_renewed_derivatives_may_have_a_margin_of_its_own():
     """Every step of a search without reuse has renewed derivatives."""
-    options = Options(100, stopping=Stopping(1e-14), outrun_renewed=1e-3)
+    options = SolverOptions(100, stopping=Stopping(1e-14), outrun_renewed=1e-3)
     found = minimise(LeastSquares(meyer), np.array([[0.02, 4000.0, 250.0]]), options, rival=-1e30)
-    assert found.status == (Status.OUTRUN,)
+    assert found.status == (SolverStatus.OUTRUN,)
 
 
 @pytest.mark.parametrize("renewed", [False, True])
@@ -160,10 +160,10 @@ def test_a_search_that_a_rival_ends_need_not_renew_its_derivatives(renewed):
     """Its end is the same."""
     start = np.array([[0.02, 4000.0, 250.0]])
     near = [At(np.nan, np.empty(0), meyer(start[0])[1])]
-    options = Options(100, reuse=True, outrun=1e-3, renewed_outrun=renewed)
+    options = SolverOptions(100, reuse=True, outrun=1e-3, renewed_outrun=renewed)
     found = minimise(LeastSquares(meyer), start, options, rival=-1e30, near=near)
     (at,), (x,) = found.at, found.x
-    assert found.status == (Status.OUTRUN,)
+    assert found.status == (SolverStatus.OUTRUN,)
     assert np.array_equal(at.jacobian, meyer(x)[1]) == renewed
     assert at.cost == 0.5 * float(meyer(x)[0] @ meyer(x)[0])
 
@@ -177,7 +177,9 @@ def test_derivatives_that_promise_too_much_are_renewed():
     counts = {}
     for creeping in (0.0, 0.5):
         problems = LeastSquares(exponential)
-        options = Options(1000, stopping=Stopping(promised=1e-14), reuse=True, stale=1e-6, creeping=creeping)
+        options = SolverOptions(
+            1000, stopping=Stopping(promised=1e-14), reuse=True, stale=1e-6, creeping=creeping
+        )
         found = minimise(problems, np.array([[3.0]]), options)
         assert found.x[0, 0] == pytest.approx(np.log(1e-3), abs=1e-3)
         counts[creeping] = problems.reused
@@ -197,7 +199,7 @@ class Line:
         return self.a @ x - self.b, self.a
 
 
-NEARBY = Options(30, stopping=Stopping(promised=1e-12), reuse=True, stale=1e-9)
+NEARBY = SolverOptions(30, stopping=Stopping(promised=1e-12), reuse=True, stale=1e-9)
 
 
 def test_a_search_may_begin_with_derivatives_from_nearby():
@@ -206,7 +208,7 @@ def test_a_search_may_begin_with_derivatives_from_nearby():
     problems = LeastSquares(line)
     near = [At(np.nan, np.empty(0), 1.05 * line.a)]
     found = minimise(problems, np.zeros((1, 3)), NEARBY, near=near)
-    assert found.status == (Status.CONVERGED,)
+    assert found.status == (SolverStatus.CONVERGED,)
     np.testing.assert_allclose(found.x[0], line.best, rtol=1e-5)
     assert 0 < problems.reused < line.calls
 
@@ -217,7 +219,7 @@ def test_derivatives_at_the_start_itself_need_no_renewal(at_near):
     problems = LeastSquares(line)
     near = [At(np.nan, np.empty(0), line.a)]
     found = minimise(problems, line.best[None, :], NEARBY, near=near, at_near=at_near)
-    assert found.status == (Status.CONVERGED,)
+    assert found.status == (SolverStatus.CONVERGED,)
     assert (line.calls == problems.reused) == at_near
 
 

@@ -16,7 +16,7 @@ from airtruth.identification import identify
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.reporting import (
     TABLES,
-    Campaign,
+    FlownCampaign,
     evaluate,
     read_campaign,
     report,
@@ -279,7 +279,7 @@ def test_stacked_tables_keep_their_cells():
 
 def test_a_campaign_is_longitudinal_by_default(tmp_path):
     made = synthetic.paper_campaign(tmp_path / "c", "c", "table1", ("ls",), 5, seed=1)
-    assert isinstance(read_campaign(made), Campaign)
+    assert isinstance(read_campaign(made), FlownCampaign)
     assert read_campaign(made).motion is LONGITUDINAL
 
 

@@ -7,7 +7,7 @@ import pytest
 import report_synthetic as synthetic
 
 from airtruth.errors import LogError, StoreError
-from airtruth.reporting import Campaign, read_campaign, stored_campaign
+from airtruth.reporting import FlownCampaign, read_campaign, stored_campaign
 from airtruth.reporting.description import describe
 
 
@@ -221,5 +221,5 @@ def test_estimates_in_another_order_are_read_as_a_whole(tmp_path, pieces):
     truth, estimates, _ = pieces  # method by method
     folder = synthetic.write_campaign(tmp_path / "c", truth, estimates)
     opened = stored_campaign.open_campaign(folder)
-    assert isinstance(opened, Campaign)
+    assert isinstance(opened, FlownCampaign)
     assert opened.run_ids == tuple(synthetic.run_names(6))

@@ -12,7 +12,9 @@ from airtruth import style
 from airtruth.errors import StoreError
 from airtruth.physics import short_period
 from airtruth.reporting import read_campaign
-from airtruth.reporting.paper import distribution, figures, published
+from airtruth.reporting.paper import published
+from studies import paper_distribution as distribution
+from studies import paper_figures as figures
 
 TRUTH = synthetic.TRUTH[:6]
 

@@ -14,7 +14,7 @@ from airtruth.errors import ConfigurationError, StoreError
 from airtruth.reporting import TABLES, TableSpec, evaluate, read_campaign
 from airtruth.reporting import statistics as mc
 from airtruth.reporting.paper import comparison, layout, published
-from airtruth.reporting.paper.tables import LONG_COLUMNS, Entry, all_methods, long_form, methods_of
+from airtruth.reporting.paper.tables import LONG_COLUMNS, PaperEntry, all_methods, long_form, methods_of
 from airtruth.reporting.partial import Sample, method_statistics
 from airtruth.reporting.write import write_tables
 from airtruth.table import MISSING, WIDTH, as_csv, as_latex, as_markdown, as_text
@@ -109,11 +109,13 @@ def test_differences_have_unit_variance_under_the_null():
         beside = comparison.published_figures(column, 300, s)
         for j, name in enumerate(published.ESTIMATED):
             zs["mean"].append(
-                Entry("x", name, "mean", s.mean.value[j], s.mean.se[j], *beside[name, "mean"]).z
+                PaperEntry("x", name, "mean", s.mean.value[j], s.mean.se[j], *beside[name, "mean"]).z
             )
-            zs["std"].append(Entry("x", name, "std", s.std.value[j], s.std.se[j], *beside[name, "std"]).z)
+            zs["std"].append(
+                PaperEntry("x", name, "std", s.std.value[j], s.std.se[j], *beside[name, "std"]).z
+            )
         own = 100.0 * s.relerr.value, 100.0 * s.relerr.se
-        zs["relerr_pct"].append(Entry("x", "six", "relerr_pct", *own, *beside["six", "relerr_pct"]).z)
+        zs["relerr_pct"].append(PaperEntry("x", "six", "relerr_pct", *own, *beside["six", "relerr_pct"]).z)
     for statistic, values in zs.items():
         tolerance = 0.15 if statistic == "relerr_pct" else 0.1
         assert np.mean(values) == pytest.approx(0.0, abs=0.2), statistic

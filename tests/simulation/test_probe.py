@@ -7,21 +7,28 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.errors import AircraftError
-from airtruth.physics.longitudinal import simulate
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
-from airtruth.simulation.probe import Grid, alpha_dot_terms, grid_about, probe, with_breaks, with_breaks_of
+from airtruth.simulation.probe import (
+    ForceGrid,
+    alpha_dot_terms,
+    grid_about,
+    probe,
+    with_breaks,
+    with_breaks_of,
+)
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing.model.plant import looked_up
 from airtruth.tracing.model.probed import probed, with_throttle
 from airtruth.units import DEG
+from studies.longitudinal_motion import model_of, simulate
 
 
 @pytest.fixture(scope="module")
 def model(gtm, paper_trim):
-    return probe(gtm, paper_trim)
+    return model_of(gtm, paper_trim)
 
 
 @pytest.mark.parametrize("kind", ["doublet", "3211"])
@@ -106,7 +113,7 @@ def test_the_tables_of_a_turboprop_have_its_power(tmp_path):
     at = trim(plane, Condition(52.7, 1500.0, 0.0))
     command = at.controls.elevator_command_rad + np.array([-DEG, 0.0, DEG])
     alpha = at.alpha_rad + np.array([-DEG, 0.0, DEG])
-    tables = probe(plane, at, Grid(alpha, command, np.zeros(1), np.ones(1))).tables
+    tables = probe(plane, at, ForceGrid(alpha, command, np.zeros(1), np.ones(1)))
     c = plane.constants
     moment = tables.values[0, :, :, 0, 2] / (
         0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * c.wing_area_m2 * c.chord_m
@@ -130,8 +137,8 @@ def test_the_plant_of_a_propeller_has_its_forces_at_other_angles_and_airspeeds(t
     at = trim(plane, Condition(51.7, 1500.0, 0.0))
     plant = probed(plane, at, (at.alpha_rad, 8.0 * DEG), (at.elevator_rad, at.elevator_rad), 0.1)
     command = np.array([at.controls.elevator_command_rad])
-    other = Grid(np.array([5.0, 7.5]) * DEG, command, np.zeros(1), np.array([0.94, 1.05]))
-    tables = probe(plane, at, other).tables
+    other = ForceGrid(np.array([5.0, 7.5]) * DEG, command, np.zeros(1), np.array([0.94, 1.05]))
+    tables = probe(plane, at, other)
     states = [(v, a) for v in range(3) for a in range(1, 3)]
     alpha = tables.alpha_rad[[a for _, a in states]]
     pressure = 0.5 * at.density_kg_m3 * tables.airspeed_m_s[[v for v, _ in states]] ** 2
@@ -192,7 +199,7 @@ def test_the_breaks_of_a_model_whose_tables_are_in_radians():
     """The slope of CL in c172x.xml doubles between 0.09 and 0.10 rad; the forces in body axes are slightly curved."""
     plane = aircraft.load("c172x")
     at = trim(plane, Condition(51.44, 1219.2))
-    grid = Grid(
+    grid = ForceGrid(
         np.arange(3.0, 9.0) * DEG, np.array([at.controls.elevator_command_rad]), np.zeros(1), np.ones(1)
     )
     found = with_breaks(plane, at, grid).alpha_rad

@@ -7,16 +7,16 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.identification import Options, identify_batch
-from airtruth.physics.longitudinal import auxiliary
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
-from airtruth.simulation.probe import grid_about, probe
+from airtruth.simulation.probe import grid_about
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG
 from studies import closed_loop_study as study
 from studies.affine_aircraft import affine_copy
+from studies.longitudinal_motion import auxiliary, model_of
 
 pytestmark = pytest.mark.slow
 
@@ -100,7 +100,7 @@ def test_gusts_in_the_loop_spare_the_filter_with_gusts_in_its_model(affine, affi
 @pytest.mark.long
 def test_nonlinear_auxiliary_changes_nothing_where_the_aircraft_is_affine(affine, affine_trim):
     batch = study.fly(affine.folder, study.Level(0.0, 1.0, 1.0), 20, 5)
-    model = probe(affine, affine_trim, grid_about(affine_trim, 8 * DEG, 4 * DEG, 48 * DEG))
+    model = model_of(affine, affine_trim, grid_about(affine_trim, 8 * DEG, 4 * DEG, 48 * DEG))
     plain = Options(covariance="none", tolerance=1e-4)
     linear = identify_batch(batch, affine, "iv-f1", plain)
     declared = linearise(affine, affine_trim).plus

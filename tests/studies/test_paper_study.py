@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airtruth.logs.store import read_table
-from airtruth.reporting.paper.tables import Entry
+from airtruth.reporting.paper.tables import PaperEntry
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.table import as_markdown
 from airtruth.units import DEG
@@ -76,8 +76,8 @@ def test_both_breaks_as_regressors_recover_cmalpha(small):
 
 
 def test_shown_rounds_to_the_error():
-    assert study.shown(Entry("ls", "CLq", "mean", 88.4567, 2.345)) == "88.5 ± 2.3"
-    assert study.shown(Entry("ls", "", "iterations", 2.0)) == "2"
+    assert study.shown(PaperEntry("ls", "CLq", "mean", 88.4567, 2.345)) == "88.5 ± 2.3"
+    assert study.shown(PaperEntry("ls", "", "iterations", 2.0)) == "2"
 
 
 @pytest.mark.long

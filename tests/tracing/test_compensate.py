@@ -20,7 +20,7 @@ from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm, Surf
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.compensate import (
     Compensation,
-    Condition,
+    RunCondition,
     compensated_log,
     compensation_of,
     treatment_of,
@@ -142,7 +142,7 @@ def log_of(terms, amplitudes, noise=None, duration_s=6.0):
     )
 
 
-KNOWN = Compensation((Condition(V, TRUTH),), TERMS, from_trim=True)
+KNOWN = Compensation((RunCondition(V, TRUTH),), TERMS, from_trim=True)
 BENT = log_of(TERMS, (1.0 * DEG, -1.5 * DEG))
 STRAIGHT = log_of((), (1.0 * DEG, -1.5 * DEG))
 METHODS = ("ls", "iv-lowpass", "iv-reference", "iv-actuator", "iv-f1", "iv-f2", "frequency", "output-error")
@@ -183,7 +183,7 @@ def test_moment_derivatives_of_a_known_break_are_the_truth(name, tolerance):
 
 
 def test_derivatives_that_are_off_enter_by_the_share_of_the_motion():
-    off = replace(KNOWN, conditions=(Condition(V, 1.1 * TRUTH),))
+    off = replace(KNOWN, conditions=(RunCondition(V, 1.1 * TRUTH),))
     once = (
         identify_without_effects([BENT], GTM, ["iv-f1"], off)
         .to_frame()[list(LONGITUDINAL.parameters)]
@@ -191,7 +191,7 @@ def test_derivatives_that_are_off_enter_by_the_share_of_the_motion():
     )
     error = np.abs(once[:, 3] / TRUTH[3] - 1.0)
     assert np.all(error < 0.03)
-    again = replace(off, conditions=(Condition(V, once.mean(axis=0)),))
+    again = replace(off, conditions=(RunCondition(V, once.mean(axis=0)),))
     twice = (
         identify_without_effects([BENT], GTM, ["iv-f1"], again)
         .to_frame()[list(LONGITUDINAL.parameters)]
@@ -268,7 +268,7 @@ def test_states_answer_a_ramp_as_the_books_say():
 def test_late_lift_is_taken_out():
     late = StateTerm("late", "lag", "alpha", 0.1)
     taken = Compensation(
-        (Condition(V, TRUTH),), (AeroTerm("CL", "late", "linear", 0.0),), (late,), from_trim=True
+        (RunCondition(V, TRUTH),), (AeroTerm("CL", "late", "linear", 0.0),), (late,), from_trim=True
     )
     assert np.array_equal(
         compensated_log(STRAIGHT, GTM.constants, taken).channels["q_rad_s"], STRAIGHT.channels["q_rad_s"]
@@ -317,7 +317,8 @@ def test_errors_of_sensors_are_undone():
     log = replace(BENT, channels=BENT.channels | {"q_rad_s": q, "alpha_rad": 1.1 * late + 0.02})
     terms = (("scale", 1.1), ("bias", 0.02), ("delay", 0.04), ("arm", 0.5))
     taken = Compensation(
-        (Condition(V, TRUTH),), sensors=tuple(SensorTerm("alpha_rad", kind, value) for kind, value in terms)
+        (RunCondition(V, TRUTH),),
+        sensors=tuple(SensorTerm("alpha_rad", kind, value) for kind, value in terms),
     )
     found = compensated_log(log, GTM.constants, taken)
     inside = (t > 0.1) & (t < t.max() - 0.1)  # the last 40 ms of a late channel are unknown
@@ -334,7 +335,7 @@ def test_the_arm_of_an_accelerometer_is_undone():
         channels=BENT.channels
         | {"q_rad_s": 0.2 * np.cos(3.0 * t), "az_m_s2": -G0 + 0.4 * 0.6 * np.sin(3.0 * t)},
     )
-    taken = Compensation((Condition(V, TRUTH),), sensors=(SensorTerm("az_m_s2", "arm", 0.4),))
+    taken = Compensation((RunCondition(V, TRUTH),), sensors=(SensorTerm("az_m_s2", "arm", 0.4),))
     found = compensated_log(log, GTM.constants, taken).channels["az_m_s2"]
     inside = (t > 0.5) & (t < t.max() - 0.5)
     np.testing.assert_allclose(found[inside], -G0, atol=2e-3)
@@ -343,14 +344,14 @@ def test_the_arm_of_an_accelerometer_is_undone():
 def test_the_elevator_becomes_the_surface_that_the_air_sees():
     t = BENT.t_s
     log = replace(BENT, channels=BENT.channels | {"elevator_rad": 0.03 * sine(t)})
-    taken = Compensation((Condition(V, TRUTH),), surface=(SurfaceTerm("delay", 0.06),))
+    taken = Compensation((RunCondition(V, TRUTH),), surface=(SurfaceTerm("delay", 0.06),))
     found = compensated_log(log, GTM.constants, taken).channels["elevator_rad"]
     inside = t > 0.06
     np.testing.assert_allclose(found[inside], 0.03 * sine(t, 0.06)[inside], atol=1e-12)
 
 
 def test_mass_and_inertia_change_the_constants():
-    taken = Compensation((Condition(V, TRUTH),), declared={"mass": 1.1, "inertia": 0.9})
+    taken = Compensation((RunCondition(V, TRUTH),), declared={"mass": 1.1, "inertia": 0.9})
     heavier = updated_constants(GTM, taken)
     assert heavier.mass_kg == pytest.approx(1.1 * GTM.mass_kg)
     assert heavier.inertia_yy_kg_m2 == pytest.approx(0.9 * GTM.inertia_yy_kg_m2)
@@ -359,7 +360,7 @@ def test_mass_and_inertia_change_the_constants():
 
 def test_each_record_takes_the_derivatives_of_its_flight_condition():
     """Two conditions: the nearest airspeed counts."""
-    other = Condition(1.5 * V, 3.0 * TRUTH)
+    other = RunCondition(1.5 * V, 3.0 * TRUTH)
     both = replace(KNOWN, conditions=(other, *KNOWN.conditions))
     one, two = (compensated_log(BENT, GTM.constants, c).channels["q_rad_s"] for c in (KNOWN, both))
     np.testing.assert_array_equal(one, two)

@@ -14,7 +14,7 @@ from airtruth.physics.sensors import rotation_acceleration, vane_beta
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, SensorTerm, SurfaceTerm
 from airtruth.tracing.compensate import (
     Compensation,
-    Condition,
+    RunCondition,
     compensated_log,
     treatment_of,
     updated_constants,
@@ -33,7 +33,7 @@ def log(**channels):
 
 
 def taken(**changed):
-    return Compensation((Condition(SPEED, THETA),), motion=LATERAL, **changed)
+    return Compensation((RunCondition(SPEED, THETA),), motion=LATERAL, **changed)
 
 
 def test_a_boom_is_undone_with_both_rates():

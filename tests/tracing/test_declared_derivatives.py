@@ -9,10 +9,14 @@ from scipy.stats import kstest
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.declared_model import remaining_evidence
 from airtruth.tracing.inference import derivative_likelihood as module
-from airtruth.tracing.inference.derivative_likelihood import contradiction, derivative_likelihood
+from airtruth.tracing.inference.derivative_likelihood import (
+    DERIVATIVES_MOVED,
+    contradiction,
+    derivative_likelihood,
+)
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.model.declared import declared_covariance
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
-from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.families import advice
 
 DECLARED = np.diag([0.24, 9.5, 0.05, 0.09, 6.2, 0.09]) ** 2
@@ -121,10 +125,10 @@ def test_what_an_answer_leaves_is_in_the_remaining_evidence(white):
     """The anomaly of the last round, or the derivatives with twice the probability of their test (Bonferroni)."""
     cause = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.5])
     problem, fitted = fit_of(cause)
-    anomaly = Anomaly("a drift in time", 3.0, 5, 0.4)
+    anomaly = HypothesisTest("a drift in time", 3.0, 5, 0.4)
     left = remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly))
     test = contradiction(problem, fitted)
-    assert left == Anomaly(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
-    assert advice(left.where, LONGITUDINAL).startswith("trace again with `derivatives` among the candidates")
+    assert left == HypothesisTest(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
+    assert advice(left.null, LONGITUDINAL).startswith("trace again with `derivatives` among the candidates")
     problem, fitted = fit_of(cause, np.outer(cause, cause))
     assert remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly)) is anomaly

@@ -17,14 +17,16 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.causes import DERIVATIVES, Cause
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.selection.best_first import best_first
-from airtruth.tracing.selection.evidence import Column, Quadratic
+from airtruth.tracing.selection.evidence import EffectColumn, Quadratic
 from airtruth.tracing.selection.expansion import expanded
 from airtruth.tracing.selection.explanation import LOG_WRONG, WRONG_BY
 from airtruth.tracing.selection.set_table import SetTable
 
 SAMPLES = 40
 WIDE = Prior(0.4, -1e3, 1e3, shape=0.0, log_odds=-2.0)
-CAUSES = tuple(Column(cause=Cause(f"c{k}", np.zeros(2), replace(WIDE, std=0.2 * (k + 1)))) for k in range(3))
+CAUSES = tuple(
+    EffectColumn(cause=Cause(f"c{k}", np.zeros(2), replace(WIDE, std=0.2 * (k + 1)))) for k in range(3)
+)
 
 
 def linear(columns=CAUSES, seed=3, truth=(0.1, -0.2, 0.3, 0.0, 0.0), temper=1.0):
@@ -75,7 +77,7 @@ def test_the_evidence_of_a_log_uniform_size_is_its_integral(effect):
         np.diag([1.0, std**-2]),
         np.eye(1),
         1,
-        (Column(effect),),
+        (EffectColumn(effect),),
     )
     low, high = first.material, max(abs(end) for end in first.reach)
     sides = 1.0 if first.one_sided else 2.0
@@ -98,7 +100,7 @@ def test_an_effect_of_the_wrong_sign_or_an_immaterial_size_explains_nothing():
     for size in (-5.0 * material, 0.2 * material):
         std = 0.05 * material
         q = Quadratic(
-            0.0, np.array([0.0, -size / std**2]), np.diag([1.0, std**-2]), np.eye(1), 1, (Column(lag),)
+            0.0, np.array([0.0, -size / std**2]), np.diag([1.0, std**-2]), np.eye(1), 1, (EffectColumn(lag),)
         )
         plain = {w.columns: w.log_evidence for w in q.sets(1) if not w.declaration.wrong}
         assert (0,) not in plain or plain[0,] < plain[()]
@@ -141,7 +143,7 @@ def test_the_order_of_the_effects_changes_nothing(order, seed):
 @each(st.floats(1e-3, 1e3), st.integers(0, 50))
 def test_the_unit_of_a_size_changes_nothing(unit, seed):
     """A log-uniform prior of a size in another unit, with the same limits in that unit."""
-    q, _, _ = linear((Column(VANE),), seed)
+    q, _, _ = linear((EffectColumn(VANE),), seed)
     first = VANE.parameters[0]
     scaled = replace(
         first,
@@ -154,7 +156,7 @@ def test_the_unit_of_a_size_changes_nothing(unit, seed):
         q,
         slope=q.slope * turn,
         information=q.information * np.outer(turn, turn),
-        columns=(Column(replace(VANE, parameters=(scaled,))),),
+        columns=(EffectColumn(replace(VANE, parameters=(scaled,))),),
     )
     ours, theirs = ([w.log_evidence for w in x.sets(1)] for x in (q, other))
     assert ours == pytest.approx(theirs, abs=1e-6)
@@ -162,7 +164,7 @@ def test_the_unit_of_a_size_changes_nothing(unit, seed):
 
 def test_causes_of_one_event_come_together():
     """Two causes of an event have better odds than two of their own."""
-    loading = tuple(Column(cause=replace(c.cause, event="loading")) for c in CAUSES)
+    loading = tuple(EffectColumn(cause=replace(c.cause, event="loading")) for c in CAUSES)
     apart, together = (linear(columns)[0] for columns in (CAUSES, loading))
     ours, theirs = (
         {w.columns: w.log_evidence for w in x.sets(3) if not w.declaration.wrong} for x in (apart, together)
@@ -173,8 +175,8 @@ def test_causes_of_one_event_come_together():
 
 
 def test_no_set_has_two_variants_of_an_effect_but_delays_of_two_channels():
-    delays = [Column(EFFECTS[f"sensor_delay:{c}"]) for c in ("q_rad_s", "az_m_s2")]
-    curves = [Column(EFFECTS[f"cm_alpha_nonlinear:{v}"]) for v in ("break", "quadratic")]
+    delays = [EffectColumn(EFFECTS[f"sensor_delay:{c}"]) for c in ("q_rad_s", "az_m_s2")]
+    curves = [EffectColumn(EFFECTS[f"cm_alpha_nonlinear:{v}"]) for v in ("break", "quadratic")]
     assert delays[0].may_join(delays[1])
     assert not curves[0].may_join(curves[1])
     assert not delays[0].may_join(delays[0])

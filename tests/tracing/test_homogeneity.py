@@ -7,7 +7,7 @@ import pytest
 import trace_records as tr
 from scipy.stats import chi2
 
-from airtruth.tracing.inference.homogeneity import Homogeneity, homogeneity, spread
+from airtruth.tracing.inference.homogeneity import DIFFERENCES, Homogeneity, homogeneity, spread
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.record_differences import LEVEL, differences
 
@@ -78,13 +78,16 @@ def test_two_records_do_not_show_which_one_is_wrong():
 @pytest.mark.parametrize(
     ("test", "words"),
     [
-        (Homogeneity(20.0, 18, 0.3, 1, 0.5), ""),
+        (Homogeneity(DIFFERENCES, 20.0, 18, 0.3, 1, 0.5), ""),
         (
-            Homogeneity(90.0, 18, 1e-11, 1, 0.5),
+            Homogeneity(DIFFERENCES, 90.0, 18, 1e-11, 1, 0.5),
             "without r1 the others agree (p = 0.5): look for a fault or another loading in r1",
         ),
-        (Homogeneity(90.0, 18, 1e-11, 1, 1e-3), "no single record is the reason"),
-        (Homogeneity(90.0, 6, 1e-11, None, 1.0), "two records do not show which of them is wrong"),
+        (Homogeneity(DIFFERENCES, 90.0, 18, 1e-11, 1, 1e-3), "no single record is the reason"),
+        (
+            Homogeneity(DIFFERENCES, 90.0, 6, 1e-11, None, 1.0),
+            "two records do not show which of them is wrong",
+        ),
     ],
 )
 def test_sentence(test, words):

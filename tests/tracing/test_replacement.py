@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from airtruth.tracing.selection.outcome import Outcome, required_lead
+from airtruth.tracing.selection.outcome import SearchOutcome, required_lead
 
 LEAD = 5.0
 MISFIT, REMAINS, CLEAN = 9e-7, 2e-6, 0.06
@@ -32,4 +32,4 @@ FEWER = -math.log(10.0)
     ],
 )
 def test_the_lead_of_each_case(old, new, needed):
-    assert required_lead(Outcome(*old), Outcome(*new), LEAD) == pytest.approx(needed)
+    assert required_lead(SearchOutcome(*old), SearchOutcome(*new), LEAD) == pytest.approx(needed)

@@ -8,10 +8,10 @@ import trace_records as tr
 from scaled_records import disturbed_problem
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.inference.robust import inflation
 from airtruth.tracing.selection import acceptance
-from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import (
@@ -34,7 +34,7 @@ def test_the_gains_of_33_candidates_are_round(level, gain):
 
 @pytest.mark.parametrize(("p_value", "gain"), [(1.0, 16.0), (1e-6, 16.0), (9e-7, 25.0), (0.0, 25.0)])
 def test_beside_an_anomaly_beyond_doubt_a_later_effect_needs_more(p_value, gain):
-    assert later_gain(33, Anomaly("alpha_rad", 50.0, 1, p_value)) == pytest.approx(gain, abs=1e-8)
+    assert later_gain(33, HypothesisTest("alpha_rad", 50.0, 1, p_value)) == pytest.approx(gain, abs=1e-8)
 
 
 CANDIDATES = tuple(EFFECTS[key] for key in ("gyro_scale", "vane_scale", "accelerometer_scale"))

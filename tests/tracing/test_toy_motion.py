@@ -1,16 +1,26 @@
 """A motion that the package does not know, through description, layouts, filter, fit and one effect."""
 
+import json
+
 import numpy as np
 import pytest
 from numba.core.caching import NullCache
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import least_squares
-from toy_motion import ARM_M, QBAR, TOY, ToyAircraft, ToyGrid, ToyPoint
+from toy_motion import ARM_M, HALF_CHORD_M, QBAR, TOY, ToyAircraft, ToyGrid, ToyPoint
 
+from airtruth import aircraft
 from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.sensors import sensor_effects
+from airtruth.physics import motion
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
+from airtruth.tracing.answer import Derivatives, Evidence, RecordNames, TraceAnswer
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.inference.posterior import TraceProblem
+from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model import filter as record_filter
 from airtruth.tracing.model import linearise
 from airtruth.tracing.model.kernel_input import (
@@ -21,11 +31,19 @@ from airtruth.tracing.model.kernel_input import (
     SensorArrays,
 )
 from airtruth.tracing.model.parameters import ParameterLayout, Parameters, core_of, state_layout
+from airtruth.tracing.model.plant import ForceTable, Plant
+from airtruth.tracing.model.records import FINE as CELLS
+from airtruth.tracing.model.records import Signals, TraceRecord
 from airtruth.tracing.model.schedule import UNSCHEDULED
+from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.steady import steady_filter
+from airtruth.tracing.presentation.html import as_trace_html
+from airtruth.tracing.presentation.text import as_trace_text
+from airtruth.tracing.selection.score_test import table
+from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
 TRUTH = np.array([-0.12, -2.0, 0.05, -0.03, 0.004])
-HALF_CHORD_M, AIRSPEED_M_S, LENGTH_M, LEVEL = 0.5, 40.0, 200.0, 1.5
+AIRSPEED_M_S, LENGTH_M, LEVEL = 40.0, 200.0, 1.5
 DT_S, SUB, SAMPLES = 0.02, 4, 400
 FINE = 40
 """Cells of a sample of the reference, in which the inputs are linear."""
@@ -63,7 +81,7 @@ def given(y, derivatives, grid, start):
 def inputs(sub=SUB):
     t = np.arange(SAMPLES * sub + 1) * DT_S / sub
     left, right = 0.05 * np.sin(3.0 * t), 0.04 * np.sin(1.3 * t + 1.0)
-    return ToyGrid(left, right, 0.2 * np.cos(0.7 * t), np.full(t.size, AIRSPEED_M_S))
+    return ToyGrid(left, right, 0.2 * np.cos(0.7 * t), np.full(t.size, AIRSPEED_M_S), np.zeros(t.size))
 
 
 def linear(derivatives):
@@ -204,3 +222,106 @@ def test_effects_follow_from_the_description():
         "sensor_delay:left_rad",
         "sensor_delay:right_rad",
     } <= {*keys}
+
+
+SETTINGS = Settings(
+    noise=STD,
+    noise_prior=0.1,
+    bias_std=0.1 * STD,
+    gust_m_s=LEVEL,
+    log_gust_std=0.3,
+    thrust_std=0.05,
+    trim_std=np.array([1e-4]),
+    resolution=np.zeros(3),
+    layout=ParameterLayout(TOY),
+)
+
+
+def record(seed, scale):
+    """A flight of the toy as the tracer reads it, with a scale of the gyro; the declared derivatives are 10 % small."""
+    grid = np.arange((SAMPLES - 1) * SUB + 1) * DT_S / SUB
+    fine = np.arange((SAMPLES - 1) * SUB * CELLS + 1) * DT_S / (SUB * CELLS)
+    y = flown(seed)
+    y[:, 1] *= scale
+    signals = Signals(
+        run_id=f"r{seed}",
+        dt_s=DT_S,
+        sub=SUB,
+        y=y,
+        controls_rad=np.stack([0.05 * np.sin(3.0 * fine), 0.04 * np.sin(1.3 * fine + 1.0)]),
+        airspeed_m_s=np.full(grid.size, AIRSPEED_M_S),
+        ground_m_s=np.full(grid.size, AIRSPEED_M_S),
+        density_kg_m3=np.ones(grid.size),
+        theta_rad=np.zeros(grid.size),
+        altitude_m=0.0,
+        throttle=None,
+        motion=TOY,
+        alpha_rad=0.2 * np.cos(0.7 * grid),
+        control_std_rad=np.zeros(2),
+        corner_rad2=np.zeros((2, 0)),
+        surface_noise_rad2=np.zeros((2, 0)),
+    )
+    axis = np.array([-1.0, 1.0])
+    plant = Plant(
+        aircraft=aircraft.load("gtm"),
+        motion=TOY,
+        tables=(ForceTable(("alpha",), (axis,), np.zeros((2, 3))),),
+        constant=np.zeros((2, 3)),
+        trims=dict.fromkeys(("alpha", *(signal.name for signal in TOY.signals)), 0.0),
+        neutral_rad=np.zeros(2),
+        derivatives=0.9 * TRUTH,
+        derivative_cov=np.diag((0.2 * TRUTH) ** 2),
+        trim=None,
+    )
+    return TraceRecord(signals, plant, LENGTH_M)
+
+
+@pytest.mark.slow
+def test_a_scale_of_the_gyro_is_scored_named_and_estimated():
+    problem = TraceProblem(tuple(record(seed, 1.1) for seed in (2, 3)), SETTINGS)
+    effects = [e for e in sensor_effects(TOY) if e.key in ("gyro_scale", "gyro_bias", "accelerometer_scale")]
+    nothing = Hypothesis(Change(), motion=TOY)
+    null = fit(problem, nothing, initial_parameters(problem, nothing))
+    assert null.converged
+    scores = {s.effect.key: s.z for s in table(null, problem, effects, NO_WHITENER, 0).scores}
+    assert max(scores, key=lambda key: abs(scores[key])) == "gyro_scale"
+    (scale,) = (e for e in effects if e.key == "gyro_scale")
+    with_scale = nothing.plus(scale)
+    named = fit(problem, with_scale, initial_parameters(problem, with_scale))
+    assert null.cost - named.cost > 10.0
+    (values,) = named.hypothesis.values(named.point.sizes)
+    step = scale.parameters[0].size(1.1) - scale.parameters[0].size(1.0)
+    assert abs(values["factor"] - 1.1) < 4.0 * named.size_std(0) * 0.1 / abs(step)
+    found = 0.9 * TRUTH + named.point.common[: TRUTH.size]
+    assert (np.abs(found - TRUTH) < 4.0 * named.common_std[: TRUTH.size]).all()
+
+
+def test_text_tables_and_page_follow_from_the_description(monkeypatch):
+    monkeypatch.setitem(motion._MOTIONS, TOY.name, TOY)
+    values = dict(zip(TOY.parameters, TRUTH.tolist(), strict=True))
+    rms = Rms(dict.fromkeys(TOY.output_channels, 1.0), dict.fromkeys(TOY.output_channels, 1.0))
+    effect = AcceptedEffect("gyro_scale", {"factor": ParameterEstimate(1.1, 0.01, (1.08, 1.12))}, 1e-9, 4.0)
+    answer = TraceAnswer(
+        verdict="traced",
+        provisional=False,
+        anomaly=Evidence(90.0, 1e-9),
+        remaining=Evidence(5.0, 0.4),
+        effects=(effect,),
+        candidates=(),
+        error=Errors(
+            dict.fromkeys(TOY.output_channels, 2.0),
+            dict.fromkeys(("declared", "before", "after", "floor"), BySet(held_out=rms)),
+        ),
+        derivatives=Derivatives(values, values, values, dict.fromkeys(values, 0.01)),
+        updated_aircraft=None,
+        detectability={},
+        next_flight="",
+        model="linear",
+        records=RecordNames(("r1", "r2"), ("r3",)),
+    )
+    assert answer.motion is TOY
+    text, page = as_trace_text(answer), as_trace_html(answer)
+    assert "linear pendulum model" in text
+    assert all(name in text for name in TOY.parameters)
+    assert all(output.name in text and output.name in page for output in TOY.outputs)
+    assert json.loads(answer.to_json())["derivatives"]["after"] == pytest.approx(values)

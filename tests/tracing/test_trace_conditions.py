@@ -12,8 +12,8 @@ from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
+from airtruth.tracing.model.longitudinal_packing import pack_aircraft
 from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.model.response import pack_aircraft
 from airtruth.tracing.model.settings import common_prior
 from airtruth.units import DEG
 

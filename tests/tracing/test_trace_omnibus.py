@@ -11,12 +11,12 @@ from scipy.stats import chi2
 
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.records import nodes
 from airtruth.tracing.model.response import External, respond
 from airtruth.tracing.model.surface import play
-from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.families import advice, families
 from airtruth.tracing.selection.omnibus import anomalies, chi_square, views
 from airtruth.tracing.selection.rounds import SearchRound
@@ -92,7 +92,7 @@ def test_a_ringing_channel_is_found_where_it_rings():
     r = rng.standard_normal((500, 3))
     r[:, 1] += 0.8 * np.sin(2.0 * np.pi * 6.8 * 0.02 * np.arange(500))
     found = lines([r], [0.02], CHANNELS)
-    assert found.where == "q_rad_s at 6.5 to 7.0 Hz"
+    assert found.null == "q_rad_s at 6.5 to 7.0 Hz"
     assert found.p_value < 1e-12
     # 500 samples of 20 ms: a line every 0.1 Hz, five to a band
     assert found.degrees == 10
@@ -116,21 +116,21 @@ def test_a_strong_mode_is_not_taken_for_colour(size):
         r[:, 1] += size * ringing / ringing.std()
         records.append(r)
     found = lines(records, [0.02] * 4, CHANNELS)
-    assert found.where == "q_rad_s at 6.5 to 7.0 Hz"
+    assert found.null == "q_rad_s at 6.5 to 7.0 Hz"
     assert found.p_value < 1e-9
 
 
 def test_records_of_several_rates_share_their_bands():
     rng = np.random.default_rng(5)
     found = lines([rng.standard_normal((100, 3)), rng.standard_normal((40, 3))], [0.02, 0.05], CHANNELS)
-    assert float(found.where.split(" to ")[1].split()[0]) <= 10.0
+    assert float(found.null.split(" to ")[1].split()[0]) <= 10.0
     assert lines([rng.standard_normal((20, 3))], [0.5], CHANNELS).p_value == 1.0
 
 
 def seen(records):
     problem = tr.problem(records)
     null = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
-    return {a.where if a.where in FAMILIES else "lines": a for a in anomalies(null, problem, NO_WHITENER)}
+    return {a.null if a.null in FAMILIES else "lines": a for a in anomalies(null, problem, NO_WHITENER)}
 
 
 def pair(rng, samples=200, sigma_w=0.3):
@@ -272,15 +272,15 @@ def stage(unnamed, adjusted=(), z=()):
 
 
 def test_the_smallest_p_value_counts_times_the_number_of_tests():
-    unnamed = [Anomaly("one", 9.0, 2, 0.011), Anomaly("two", 1.0, 3, 0.8)]
+    unnamed = [HypothesisTest("one", 9.0, 2, 0.011), HypothesisTest("two", 1.0, 3, 0.8)]
     found = stage(unnamed, [0.3, 0.004], [1.1, -3.9]).anomaly
-    assert (found.where, found.statistic, found.p_value) == ("effect 1", pytest.approx(3.9**2), 0.012)
+    assert (found.null, found.statistic, found.p_value) == ("effect 1", pytest.approx(3.9**2), 0.012)
     found = stage(unnamed, [0.3, 0.04], [1.1, -3.9]).anomaly
-    assert (found.where, found.statistic, found.p_value) == ("one", 9.0, pytest.approx(0.033))
+    assert (found.null, found.statistic, found.p_value) == ("one", 9.0, pytest.approx(0.033))
     assert stage(unnamed).anomaly.p_value == pytest.approx(0.022)
 
 
 def test_among_p_values_that_are_all_zero_the_strongest_counts():
-    unnamed = [Anomaly("one", 2000.0, 12, 0.0), Anomaly("two", 5000.0, 28, 0.0)]
-    assert stage(unnamed, [0.0, 0.0], [40.0, -60.0]).anomaly.where == "two"
-    assert stage(unnamed, [0.0, 0.0], [40.0, -90.0]).anomaly.where == "effect 1"
+    unnamed = [HypothesisTest("one", 2000.0, 12, 0.0), HypothesisTest("two", 5000.0, 28, 0.0)]
+    assert stage(unnamed, [0.0, 0.0], [40.0, -60.0]).anomaly.null == "two"
+    assert stage(unnamed, [0.0, 0.0], [40.0, -90.0]).anomaly.null == "effect 1"

@@ -13,7 +13,7 @@ from airtruth.effects.increment import Memory, Shape, increment
 from airtruth.physics.readings import reading_increments, state_of
 from airtruth.physics.terms import Change, ReadingTerm, StateTerm
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.compensate import Compensation, Condition, compensated_log
+from airtruth.tracing.compensate import Compensation, RunCondition, compensated_log
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
@@ -107,7 +107,7 @@ def test_the_loop_takes_the_increment_out_of_the_records(tmp_path):
         flights.log_of(flights.fly(tmp_path / name, aircraft=plane, runs=1, gust=flights.CALM))
         for name, plane in (("declared", "gtm"), ("bent", str(folder)))
     )
-    taken = Compensation((Condition(40.0, tr.TRUTH),), readings=BENDING.readings, states=BENDING.states)
+    taken = Compensation((RunCondition(40.0, tr.TRUTH),), readings=BENDING.readings, states=BENDING.states)
     mended = compensated_log(bent, aircraft.load("gtm").constants, taken)
     before, after = (np.std(log.channels["q_rad_s"] - clean.channels["q_rad_s"]) for log in (bent, mended))
     # the surface between the samples, on which a mode of 7 Hz depends, and its noise remain

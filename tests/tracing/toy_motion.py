@@ -12,7 +12,9 @@ import numpy as np
 from airtruth.numerics.compiled import inner
 from airtruth.physics.motion import Motion
 from airtruth.physics.motion_parts import Coefficient, Control, Declared, Mode, Output, Signal, State
-from airtruth.tracing.model.by_motion import Equations, register
+from airtruth.tracing.model.by_motion import MotionEquations, register
+from airtruth.tracing.model.packing import Packing
+from airtruth.tracing.model.response import register_packing
 
 TOY = Motion(
     name="toy",
@@ -43,6 +45,7 @@ TOY = Motion(
     required=("theta_rad", "q_rad_s"),
     forces="moment",
     incidence="angle of the pendulum",
+    linear="pendulum",
 )
 
 
@@ -60,6 +63,7 @@ class ToyPoint(NamedTuple):
     right: float
     wind: float
     airspeed_m_s: float
+    moment: float
 
 
 class ToyGrid(NamedTuple):
@@ -69,6 +73,7 @@ class ToyGrid(NamedTuple):
     right: np.ndarray
     wind: np.ndarray
     airspeed_m_s: np.ndarray
+    moment: np.ndarray
 
 
 ARM_M = 3.0
@@ -80,7 +85,7 @@ def rates(x, at, model, out):
     d, v = model.aircraft.derivatives, at.airspeed_m_s
     drive = d[0] * x[0] + d[1] * x[1] * model.aircraft.half_chord_m / v + d[2] * at.left + d[3] * at.right
     out[0] = x[1]
-    out[1] = 2.0 * QBAR * (drive + d[4] * (at.wind + model.gusts.level_m_s * x[3]))
+    out[1] = 2.0 * QBAR * (drive + d[4] * (at.wind + model.gusts.level_m_s * x[3]) + at.moment)
     a = v / model.gusts.length_m
     out[2] = -a * x[2]
     out[3] = a * (x[2] - x[3])
@@ -98,7 +103,8 @@ def outputs(x, rate, force, at, model, y):
 
 @inner
 def air_at(grid, point):
-    return ToyPoint(grid.left[point], grid.right[point], grid.wind[point], grid.airspeed_m_s[point])
+    wind, moment = grid.wind[point], grid.moment[point]
+    return ToyPoint(grid.left[point], grid.right[point], wind, grid.airspeed_m_s[point], moment)
 
 
 @inner
@@ -112,7 +118,12 @@ def settle(x, at, model):
 
 @inner
 def shifted(at, field, by):
-    return ToyPoint(at.left + by * (field == 0), at.right + by * (field == 1), at.wind, at.airspeed_m_s)
+    left, right, moment = (
+        at.left + by * (field == 0),
+        at.right + by * (field == 1),
+        at.moment + by * (field == 4),
+    )
+    return ToyPoint(left, right, at.wind, at.airspeed_m_s, moment)
 
 
 @inner
@@ -123,5 +134,22 @@ def signals_at(x, at, rate, model, out):
 register(
     ToyAircraft,
     ToyGrid,
-    Equations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, signals_at, ToyPoint, 1),
+    MotionEquations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, signals_at, ToyPoint, 1),
+)
+
+
+HALF_CHORD_M = 0.5
+
+
+def packed(plant, compiled, common, entries):
+    return ToyAircraft(plant.derivatives + common[entries.derivatives], HALF_CHORD_M)
+
+
+def known(signals, compiled, air):
+    """The wind, which a run of the toy holds in place of an angle of attack, and the airspeed."""
+    return signals.alpha_rad, air.airspeed_m_s
+
+
+register_packing(
+    TOY, Packing(ToyGrid, known, packed, lambda gusts, span_m: gusts._replace(rolloff=0.0, rotary=0.0))
 )

@@ -14,13 +14,13 @@ from typing import Any, Final
 from airtruth.aircraft.jsbsim.confine import controls_simulation, model_files
 from airtruth.errors import AircraftError
 from airtruth.isolation.client import call
-from airtruth.isolation.limits import Limits
+from airtruth.isolation.limits import ProcessLimits
 from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.logs.temporary import private_folder, remove
 from airtruth.quantity import Strict
 from airtruth.units import FT, SLUG
 
-_LIMITS: Final = Limits(seconds=60.0, memory_bytes=3_000_000_000)
+_LIMITS: Final = ProcessLimits(seconds=60.0, memory_bytes=3_000_000_000)
 """Limits of JSBSim while it loads a model (judgement: far above those of any shipped model, and a user still waits for the
 message)."""
 _MODULES: Final = ("airtruth.aircraft.probe_child", "jsbsim")

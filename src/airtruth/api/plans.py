@@ -141,11 +141,11 @@ def plan(
         return forecast(campaign_of(campaign), records, pressure, motion=motion)
     if motion is not None:
         raise ConfigurationError("plan: motion applies to a predicted accuracy; leave it out")
-    from airtruth.design.from_files import Stated, planned_from
+    from airtruth.design.from_files import Request, planned_from
 
     options = PlanOptions(limits or Limits(), records, seed)
     source = base_campaign(None if campaign is None else campaign_of(campaign), trace is not None, aircraft)
-    stated = Stated(split, sizes or {}, derivatives, None if trace is None else as_path("trace", trace))
+    stated = Request(split, sizes or {}, derivatives, None if trace is None else as_path("trace", trace))
     to = None if out is None else as_path("out", out)
     return planned_from(source, stated, aircraft, options, to, force=force)
 

@@ -18,7 +18,7 @@ from airtruth.logs.provenance import PROVENANCE, Provenance
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat, to_frame, write_table
 from airtruth.tracing.answer import ANSWER, TraceAnswer
-from airtruth.tracing.motions import Part, parts_of
+from airtruth.tracing.motions import MotionTrace, parts_of
 from airtruth.tracing.presentation.files import ERRORS
 from airtruth.tracing.presentation.several import by_motion
 from airtruth.tracing.presentation.text import effect_line
@@ -212,7 +212,7 @@ def _earlier(task: TraceTask) -> TracedSet | None:
     return None
 
 
-def _is_answered(task: TraceTask, part: Part) -> bool:
+def _is_answered(task: TraceTask, part: MotionTrace) -> bool:
     """Whether the folder of a motion holds its answer of the same version, options and inputs."""
     folder = part.into(task.out) or task.out
     if not all((folder / name).is_file() for name in (ANSWER, FILE, ERRORS)):

@@ -16,9 +16,9 @@ from airtruth.checks.gate import admit
 from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
 from airtruth.checks.kinematics_fit import limits_of, problem_of
-from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, Record, thinned
+from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, LongitudinalSamples, thinned
 from airtruth.checks.kinematics_record import declared_biases, declared_errors
-from airtruth.checks.kinematics_search import Search, completed, search
+from airtruth.checks.kinematics_search import ErrorSearch, completed, search
 from airtruth.checks.kinematics_vaneless import untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding
@@ -155,9 +155,9 @@ def check_kinematics(
     )
 
 
-def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
+def _records(logs: Sequence[FlightLog]) -> tuple[list[LongitudinalSamples], list[str]]:
     """Runs worth judging, with the channels that all of them have, and remarks on absent ones."""
-    records: list[Record] = []
+    records: list[LongitudinalSamples] = []
     runs = sum(len(log.run_ids) for log in logs)
     optional = ("ax_m_s2", "theta_rad", *ROTATION)
     present = {n: all(n in log.channels for log in logs) for n in optional}
@@ -172,7 +172,9 @@ def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
                 continue
             if len(records) < MOST_RECORDS:
                 further = (log.channels[n][rows] if there else None for n, there in present.items())
-                records.append(thinned(Record(run_id, dt, airspeed, alpha, q, az, elevator, *further)))
+                records.append(
+                    thinned(LongitudinalSamples(run_id, dt, airspeed, alpha, q, az, elevator, *further))
+                )
     if not records:
         raise LogError(
             f"no run can be assessed: {runs} runs are shorter than about two seconds, or elevator, "
@@ -202,7 +204,7 @@ def _chord_of(logs: Sequence[FlightLog]) -> float | None:
     return None
 
 
-def _candidates(records: Sequence[Record], chord_m: float | None) -> dict[str, float]:
+def _candidates(records: Sequence[LongitudinalSamples], chord_m: float | None) -> dict[str, float]:
     """Errors that the channels can show, with their usual sizes [SI]."""
     result = {}
     for name, error in ERRORS.items():
@@ -213,7 +215,7 @@ def _candidates(records: Sequence[Record], chord_m: float | None) -> dict[str, f
     return result
 
 
-def _airspeed(found: Search) -> list[Finding]:
+def _airspeed(found: ErrorSearch) -> list[Finding]:
     """Delay and position error of airspeed, by the equation of airspeed alone.
 
     That equation needs the vertical position of the longitudinal accelerometer, its alignment and the lag of the
@@ -229,7 +231,7 @@ def _airspeed(found: Search) -> list[Finding]:
     return errors_of(completed(search(alone, usual), usual), usual)
 
 
-def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
+def _biases(found: ErrorSearch, known: Mapping[str, float]) -> list[Finding]:
     """Biases of gyro, az and ax from the ramps of the equations, beside the sums that known ones make there."""
     problem, one = found.problem, found.best.fit
     scale = dict(zip(one.names, one.value, strict=True)).get("vane_scale", problem.start("vane_scale"))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_fit import Fit
-from airtruth.checks.kinematics_search import Search
+from airtruth.checks.kinematics_search import ErrorSearch
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Estimate:
     alone: float
 
 
-def averaged(found: Search, name: str, usual: Mapping[str, float]) -> Estimate:
+def averaged(found: ErrorSearch, name: str, usual: Mapping[str, float]) -> Estimate:
     """Size of an error, averaged over all sets that contain it.
 
     The weights are the posterior probabilities of the sets (J. A. Hoeting et al., *Statistical Science* 14(4), 1999,
@@ -90,7 +90,7 @@ def averaged(found: Search, name: str, usual: Mapping[str, float]) -> Estimate:
     return Estimate(name, centre, spread, float(lower), float(upper), alone)
 
 
-def _posterior(found: Search, one: Fit, usual: Mapping[str, float]) -> tuple[Array, Array, float]:
+def _posterior(found: ErrorSearch, one: Fit, usual: Mapping[str, float]) -> tuple[Array, Array, float]:
     """Mean and covariance of the sizes of a set without limits, and the logarithm of its weight."""
     start = np.array([found.problem.start(n) for n in one.names])
     prior = np.diag(np.array([usual[n] for n in one.names]) ** 2)
@@ -109,7 +109,7 @@ def _posterior(found: Search, one: Fit, usual: Mapping[str, float]) -> tuple[Arr
     return mean, 0.5 * (covariance + covariance.T), log
 
 
-def _draws(found: Search, one: Fit, mean: Array, covariance: Array) -> Array:
+def _draws(found: ErrorSearch, one: Fit, mean: Array, covariance: Array) -> Array:
     """Draws of the sizes of a set inside their limits; the fitted sizes where hardly any is inside."""
     rng = np.random.default_rng(17)
     degrees = found.problem.weight.degrees

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
-from airtruth.checks.kinematics_fit import Fit, Problem
+from airtruth.checks.kinematics_fit import Fit, KinematicProblem
 from airtruth.checks.kinematics_record import Kinematics, Samples
 
 Array = NDArray[np.float64]
@@ -19,7 +19,9 @@ SHARE: Final = 8
 """The autocovariance of a residual is taken up to this part of the record [-]: judgement."""
 
 
-def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -> tuple[Array, Array]:
+def ramps(
+    problem: KinematicProblem, one: Fit, equation: str, enlargement: float = 1.0
+) -> tuple[Array, Array]:
     """(records,) ramp of a difference and its standard error [unit of the channel over s].
 
     Integrated noise wanders; the autocovariance of the residual's increments shows how far. The uncertainty of the
@@ -55,7 +57,7 @@ def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -
     return np.array(slopes), np.array(stds)
 
 
-def ramps_of(biases: Mapping[str, float], problem: Problem, one: Fit, equation: str) -> Array:
+def ramps_of(biases: Mapping[str, float], problem: KinematicProblem, one: Fit, equation: str) -> Array:
     """(records,) ramp that known biases leave in a difference [unit of the channel over s].
 
     Parameters
@@ -86,7 +88,9 @@ def _weights(samples: int, dt_s: float) -> Array:
     return np.asarray(t / (t @ t) / dt_s)
 
 
-def _difference(problem: Problem, record: Samples, errors: Mapping[str, float], equation: str) -> Array:
+def _difference(
+    problem: KinematicProblem, record: Samples, errors: Mapping[str, float], equation: str
+) -> Array:
     return problem.kinematics.compare(record, {**problem.known, **errors}, (equation,))[equation]
 
 
@@ -107,7 +111,7 @@ def mean_of(values: Array, stds: Array) -> tuple[float, float]:
     return mean, float(np.sqrt(max(spread, 1.0) / weight.sum()))
 
 
-def rms(problem: Problem, one: Fit) -> dict[str, float]:
+def rms(problem: KinematicProblem, one: Fit) -> dict[str, float]:
     """Root mean square of what is left of each channel, constant and ramp taken out [unit of the channel]."""
     errors = {**problem.known, **dict(zip(one.names, one.value, strict=True))}
     parts: dict[str, list[Array]] = {}

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from airtruth.checks.kinematics_fit import Fit, Problem
+from airtruth.checks.kinematics_fit import Fit, KinematicProblem
 
 
-def absolute(problem: Problem, one: Fit) -> tuple[float, int]:
+def absolute(problem: KinematicProblem, one: Fit) -> tuple[float, int]:
     """Energy of the surfaces' motion that a fit leaves in each record and equation, and its degrees of freedom."""
     parts = _parts(problem, one)
     return sum((energy for _, energy, _ in parts), 0.0), sum(n for _, _, n in parts) - len(one.names)
 
 
-def by_equation(problem: Problem, one: Fit) -> dict[str, tuple[float, int]]:
+def by_equation(problem: KinematicProblem, one: Fit) -> dict[str, tuple[float, int]]:
     """The same energy for each equation, and the number of its components."""
     parts = _parts(problem, one)
     return {
@@ -22,7 +22,7 @@ def by_equation(problem: Problem, one: Fit) -> dict[str, tuple[float, int]]:
     }
 
 
-def _parts(problem: Problem, one: Fit) -> list[tuple[str, float, int]]:
+def _parts(problem: KinematicProblem, one: Fit) -> list[tuple[str, float, int]]:
     """Equation, energy and number of components of each record and equation."""
     white = problem.white(dict(zip(one.names, one.value, strict=True)))
     start, parts = 0, []

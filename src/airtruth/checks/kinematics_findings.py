@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_average import averaged
 from airtruth.checks.kinematics_bias import mean_of, ramps, ramps_of
-from airtruth.checks.kinematics_search import Search, price
-from airtruth.checks.result import Cause, Finding, State
+from airtruth.checks.kinematics_search import ErrorSearch, price
+from airtruth.checks.result import Finding, PossibleCause, State
 
 Array = NDArray[np.float64]
 
 
-def errors_of(found: Search, usual: Mapping[str, float]) -> list[Finding]:
+def errors_of(found: ErrorSearch, usual: Mapping[str, float]) -> list[Finding]:
     """Every candidate with its size, averaged over the sets that contain it, and its state.
 
     Parameters
@@ -50,7 +50,7 @@ def errors_of(found: Search, usual: Mapping[str, float]) -> list[Finding]:
     return result
 
 
-def drift(found: Search, equation: str, known: Mapping[str, float]) -> tuple[Array, float]:
+def drift(found: ErrorSearch, equation: str, known: Mapping[str, float]) -> tuple[Array, float]:
     """Ramp of an equation and the one that known biases make, (2,), and the standard error of the first."""
     slopes, stds = ramps(found.problem, found.best.fit, equation, found.enlargement)
     mean, std = mean_of(slopes, stds)
@@ -58,7 +58,7 @@ def drift(found: Search, equation: str, known: Mapping[str, float]) -> tuple[Arr
     return np.array([mean, expected]), std
 
 
-def bias_of(found: Search, name: str, unit: str, meaning: str, sizes: Array, std: float) -> Finding:
+def bias_of(found: ErrorSearch, name: str, unit: str, meaning: str, sizes: Array, std: float) -> Finding:
     """Finding of a bias; ``sizes`` are the estimated and the declared one."""
     value, declared = float(sizes[0]), float(sizes[1]) or 0.0  # not -0.0
     smallest = float(np.sqrt(price(found.problem))) * std
@@ -67,7 +67,7 @@ def bias_of(found: Search, name: str, unit: str, meaning: str, sizes: Array, std
     return Finding(name, unit, meaning, value, std, value - half, value + half, declared, smallest, state)
 
 
-def cause_of(found: Search, place: int, findings: Sequence[Finding]) -> Cause:
+def cause_of(found: ErrorSearch, place: int, findings: Sequence[Finding]) -> PossibleCause:
     """The set of errors that a search tried at a place, its sizes as fitted together."""
     one = found.tried[place]
     of_name = {f.name: f for f in findings}
@@ -84,7 +84,7 @@ def cause_of(found: Search, place: int, findings: Sequence[Finding]) -> Cause:
                 upper=float(value) + half,
             )
         )
-    return Cause(
+    return PossibleCause(
         tuple(errors),
         one.fit.statistic,
         one.cost - found.best.cost,

@@ -107,7 +107,7 @@ def _stacks_of(records: Sequence[Samples], lines: Sequence[Lines], weight: Weigh
 
 
 @dataclass(frozen=True)
-class Problem:
+class KinematicProblem:
     """Records, their lines, the common weight, and the ranges of the errors.
 
     Attributes
@@ -171,23 +171,25 @@ def problem_of(
     lines: Sequence[Lines] | None = None,
     kinematics: Kinematics = LONGITUDINAL,
     enlarged: Mapping[str, float] | None = None,
-) -> Problem:
+) -> KinematicProblem:
     """Weigh records at given errors.
 
     Parameters
     ----------
-    records, equations, known, limits : see `Problem`.
+    records, equations, known, limits : see `KinematicProblem`.
     errors : errors at which the noise is assessed; None for those declared.
     lines : lines of the records; None makes them.
     kinematics : of the motion.
-    enlarged : see `Problem`; None for no factor.
+    enlarged : see `KinematicProblem`; None for no factor.
     """
     enlarged = dict(enlarged or {})
     lines = tuple(lines or (lines_of(r, kinematics) for r in records))
     at = {**known, **(errors or {})}
     differences = [kinematics.compare(r, at, equations) for r in records]
     weight = weigh(records, lines, differences, equations, kinematics, enlarged)
-    made = Problem(tuple(records), lines, tuple(equations), known, limits, weight, kinematics, enlarged)
+    made = KinematicProblem(
+        tuple(records), lines, tuple(equations), known, limits, weight, kinematics, enlarged
+    )
     base = made.white(errors or {})
     for name, step in kinematics.offsets.items():
         moved = made.white({**(errors or {}), name: step}) - base
@@ -219,7 +221,7 @@ def _blind(columns: Array, moved: Array) -> Array:
 
 
 def fit(
-    problem: Problem,
+    problem: KinematicProblem,
     names: Sequence[str],
     start: Mapping[str, float] | None = None,
     near: Sequence[Array] | None = None,
@@ -288,7 +290,7 @@ def fit(
     )
 
 
-def _slopes(problem: Problem, names: Sequence[str], value: Array, moments: Array) -> Array:
+def _slopes(problem: KinematicProblem, names: Sequence[str], value: Array, moments: Array) -> Array:
     errors = dict(zip(names, value, strict=True))
     return np.array([problem.slope(n, errors, moments) for n in names])
 
@@ -326,4 +328,4 @@ def limits_of(
     return {name: ranges[KINDS[error.kind].dimension] for name, error in kinematics.errors.items()}
 
 
-__all__ = ["Fit", "Problem", "fit", "limits_of", "problem_of"]
+__all__ = ["Fit", "KinematicProblem", "fit", "limits_of", "problem_of"]

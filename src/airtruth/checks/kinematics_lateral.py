@@ -13,9 +13,9 @@ from scipy.stats import f as fisher
 from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_energy import by_equation
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
-from airtruth.checks.kinematics_fit import Problem, limits_of, problem_of
+from airtruth.checks.kinematics_fit import KinematicProblem, limits_of, problem_of
 from airtruth.checks.kinematics_record import thinned
-from airtruth.checks.kinematics_search import DOUBT, Search, completed, search
+from airtruth.checks.kinematics_search import DOUBT, ErrorSearch, completed, search
 from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding
@@ -104,7 +104,7 @@ def check_lateral(
     )
 
 
-def _searched(problem: Problem, usual: Mapping[str, float]) -> tuple[Search, Search]:
+def _searched(problem: KinematicProblem, usual: Mapping[str, float]) -> tuple[ErrorSearch, ErrorSearch]:
     """Outcome of a search, and the same with the test of its best set against the noise alone.
 
     The equations differ in what they leave: a good attitude shows every imperfection of a gyroscope, and a vane in the air does
@@ -235,7 +235,7 @@ def _candidates(
     return result
 
 
-def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
+def _biases(found: ErrorSearch, known: Mapping[str, float]) -> list[Finding]:
     """Biases of p, r and ay from the ramps of the equations, beside the sums that known ones make there."""
     problem = found.problem
     meanings = {

@@ -39,7 +39,7 @@ EQUATIONS: Final = ("theta", "alpha", "airspeed")
 
 
 @dataclass(frozen=True)
-class Record(Samples):
+class LongitudinalSamples(Samples):
     """Record of the longitudinal motion.
 
     Attributes
@@ -115,7 +115,7 @@ ERRORS: Final[dict[str, InstrumentError]] = {error.name: error for error in _ALL
 
 
 def compare(
-    record: Record, errors: Mapping[str, float], equations: Sequence[str] = EQUATIONS
+    record: LongitudinalSamples, errors: Mapping[str, float], equations: Sequence[str] = EQUATIONS
 ) -> dict[str, Array]:
     """Measured channel less the one that the other channels predict, of the shape of the channels, for each equation.
 
@@ -203,4 +203,12 @@ LONGITUDINAL: Final = Kinematics(
 """The kinematics of the longitudinal motion (`telling`: judgement; a smaller error does not change a derivative by more than its
 usual uncertainty)."""
 
-__all__ = ["ERRORS", "LONGITUDINAL", "InstrumentError", "Record", "compare", "stacked", "thinned"]
+__all__ = [
+    "ERRORS",
+    "LONGITUDINAL",
+    "InstrumentError",
+    "LongitudinalSamples",
+    "compare",
+    "stacked",
+    "thinned",
+]

@@ -19,7 +19,7 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from airtruth.checks.kinematics_energy import absolute
-from airtruth.checks.kinematics_fit import Fit, Problem, fit, problem_of
+from airtruth.checks.kinematics_fit import Fit, KinematicProblem, fit, problem_of
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ STARTS: Final = (0.03, 0.2, 0.6)
 
 
 @dataclass(frozen=True)
-class Explanation:
+class ErrorSet:
     """A set of errors with its fit.
 
     Attributes
@@ -62,14 +62,14 @@ class Explanation:
         """Errors of the set."""
         return frozenset(self.fit.names)
 
-    def behind(self, best: Explanation) -> float:
+    def behind(self, best: ErrorSet) -> float:
         """Distance from the best set in 2 log likelihood: by the cost, or by the records alone if that is less."""
         whole = self.cost - best.cost
         return min(whole, whole - self.improbability + best.improbability)
 
 
 @dataclass(frozen=True)
-class Search:
+class ErrorSearch:
     """Outcome of a search.
 
     Attributes
@@ -85,11 +85,11 @@ class Search:
     stable : whether the weight was assessed at the best explanation itself.
     """
 
-    problem: Problem
-    best: Explanation
-    equals: tuple[Explanation, ...]
-    tried: tuple[Explanation, ...]
-    unsound: tuple[Explanation, ...]
+    problem: KinematicProblem
+    best: ErrorSet
+    equals: tuple[ErrorSet, ...]
+    tried: tuple[ErrorSet, ...]
+    unsound: tuple[ErrorSet, ...]
     enlargement: float
     margin: float
     statistic: float
@@ -98,7 +98,7 @@ class Search:
     stable: bool
 
 
-def search(problem: Problem, usual: Mapping[str, float]) -> Search:
+def search(problem: KinematicProblem, usual: Mapping[str, float]) -> ErrorSearch:
     """Find the errors that explain records.
 
     Parameters
@@ -135,7 +135,7 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
     ranked = _ranked(problem, best, usual)
     scale, _ = _scale(problem, [f for f in best.values() if f.sound], usual)
     statistic, degrees = absolute(problem, ranked[0].fit)
-    return Search(
+    return ErrorSearch(
         problem=problem,
         best=ranked[0],
         equals=_equals(ranked, scale.margin),
@@ -150,11 +150,11 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
     )
 
 
-def _noise_degrees(problem: Problem) -> float:
+def _noise_degrees(problem: KinematicProblem) -> float:
     return len(problem.equations) * problem.weight.degrees
 
 
-def price(problem: Problem) -> float:
+def price(problem: KinematicProblem) -> float:
     """Price of a further error: the squared quantile of Student's distribution at `FALSE`."""
     return float(student.isf(0.5 * FALSE, problem.weight.degrees) ** 2)
 
@@ -169,7 +169,7 @@ class _Hint:
     slope: Array
 
 
-def _hints(problem: Problem, usual: Mapping[str, float]) -> list[_Hint]:
+def _hints(problem: KinematicProblem, usual: Mapping[str, float]) -> list[_Hint]:
     """Every candidate at each of its starts, the others as declared."""
     base = problem.moments({})
     result = []
@@ -195,7 +195,7 @@ def _promised(moments: Array, slopes: Sequence[Array], hints: Sequence[_Hint]) -
 
 
 def _sets(
-    problem: Problem,
+    problem: KinematicProblem,
     usual: Mapping[str, float],
     seeds: Sequence[Mapping[str, float]],
     hints: Sequence[_Hint],
@@ -224,7 +224,7 @@ def _sets(
 
 
 def _grow(
-    problem: Problem,
+    problem: KinematicProblem,
     known: dict[frozenset[str], Fit],
     layer: Sequence[Fit],
     more: Sequence[tuple[_Hint, ...]],
@@ -252,12 +252,12 @@ def _grow(
                 known[key] = better
 
 
-def _doubled(problem: Problem, names: frozenset[str]) -> bool:
+def _doubled(problem: KinematicProblem, names: frozenset[str]) -> bool:
     return any(len(group & names) > 1 for group in problem.kinematics.same)
 
 
 def _pruned(
-    problem: Problem,
+    problem: KinematicProblem,
     sets: dict[frozenset[str], Fit],
     usual: Mapping[str, float],
     hints: Sequence[_Hint],
@@ -281,7 +281,7 @@ def _pruned(
     return sets
 
 
-def _improbability(problem: Problem, one: Fit, usual: Mapping[str, float]) -> float:
+def _improbability(problem: KinematicProblem, one: Fit, usual: Mapping[str, float]) -> float:
     """Improbability of the sizes: -2 log of a Cauchy distribution of the usual sizes, zero for no error."""
     sizes = [(v - problem.start(n)) / usual[n] for n, v in zip(one.names, one.value, strict=True)]
     return float(2.0 * np.sum(np.log1p(np.square(sizes))))
@@ -301,7 +301,7 @@ class _Scale:
     margin: float
 
 
-def _costs(problem: Problem, fits: Sequence[Fit], usual: Mapping[str, float], exact: bool) -> Array:
+def _costs(problem: KinematicProblem, fits: Sequence[Fit], usual: Mapping[str, float], exact: bool) -> Array:
     """Costs of sets: their statistic, or, where the model is not exact, -2 log likelihood at the best noise level."""
     count = problem.weight.span.shape[1]
     rest = np.array([f.statistic for f in fits])
@@ -320,7 +320,7 @@ def _inexact(probability: float, degrees: int, count: int) -> float:
     return float(count * np.log1p(student.isf(0.5 * probability, degrees) ** 2 / degrees))
 
 
-def _scale(problem: Problem, fits: Sequence[Fit], usual: Mapping[str, float]) -> tuple[_Scale, bool]:
+def _scale(problem: KinematicProblem, fits: Sequence[Fit], usual: Mapping[str, float]) -> tuple[_Scale, bool]:
     """Whether the weight is the noise of the chosen set (exact), or what that set leaves.
 
     No kinematic model explains a real record exactly: sideslip, bending and the position of the instruments leave more
@@ -341,21 +341,24 @@ def _scale(problem: Problem, fits: Sequence[Fit], usual: Mapping[str, float]) ->
 
 
 def _ranked(
-    problem: Problem, fits: Mapping[frozenset[str], Fit], usual: Mapping[str, float], sound: bool = True
-) -> list[Explanation]:
+    problem: KinematicProblem,
+    fits: Mapping[frozenset[str], Fit],
+    usual: Mapping[str, float],
+    sound: bool = True,
+) -> list[ErrorSet]:
     _, exact = _scale(problem, [f for f in fits.values() if f.sound], usual)
     chosen = [f for f in fits.values() if f.sound is sound]
     costs = _costs(problem, chosen, usual, exact)
     return sorted(
         (
-            Explanation(f, float(c), _improbability(problem, f, usual))
+            ErrorSet(f, float(c), _improbability(problem, f, usual))
             for f, c in zip(chosen, costs, strict=True)
         ),
         key=lambda e: e.cost,
     )
 
 
-def _equals(ranked: Sequence[Explanation], most: float) -> tuple[Explanation, ...]:
+def _equals(ranked: Sequence[ErrorSet], most: float) -> tuple[ErrorSet, ...]:
     best = ranked[0]
     near = [
         e for e in ranked if e.behind(best) <= most and not (e.names > best.names or e.names < best.names)
@@ -363,7 +366,7 @@ def _equals(ranked: Sequence[Explanation], most: float) -> tuple[Explanation, ..
     return tuple(e for e in near if not any(o.names < e.names for o in near))
 
 
-def completed(found: Search, usual: Mapping[str, float]) -> Search:
+def completed(found: ErrorSearch, usual: Mapping[str, float]) -> ErrorSearch:
     """Search whose explanations were each fitted with every further candidate, in place of one of the same motion."""
     tried = {e.names: e.fit for e in (*found.unsound, *found.tried)}
     for one in found.equals[: found.problem.kinematics.most + 1]:
@@ -382,4 +385,4 @@ def completed(found: Search, usual: Mapping[str, float]) -> Search:
     )
 
 
-__all__ = ["DOUBT", "Explanation", "Search", "absolute", "completed", "price", "search"]
+__all__ = ["DOUBT", "ErrorSearch", "ErrorSet", "absolute", "completed", "price", "search"]

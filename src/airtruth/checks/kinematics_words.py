@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from airtruth.checks.kinematics_search import Search
-from airtruth.checks.result import Cause, Finding, Verdict, digits_of, shown
+from airtruth.checks.kinematics_search import ErrorSearch
+from airtruth.checks.result import Finding, PossibleCause, Verdict, digits_of, shown
 from airtruth.units import G0
 
 AGREES: Final = 0.05
@@ -17,7 +17,7 @@ _LIKE_FRICTION: Final = ("vane_lag", "sensor_delay:alpha_rad")
 """Errors that a friction of the vane imitates: a play of 1.2 deg was a lag of 33 ms on a small aircraft in gusts."""
 
 
-def verdict_of(found: Search, findings: Sequence[Finding]) -> Verdict:
+def verdict_of(found: ErrorSearch, findings: Sequence[Finding]) -> Verdict:
     """Answer of a check."""
     if limiting(found):
         return "failed"
@@ -29,7 +29,7 @@ def verdict_of(found: Search, findings: Sequence[Finding]) -> Verdict:
     return "one_of" if "one of" in states else "errors"
 
 
-def limiting(found: Search) -> tuple[str, ...]:
+def limiting(found: ErrorSearch) -> tuple[str, ...]:
     """Errors whose fit ended at a limit or unconverged although it explains more than the best set."""
     names = [
         n
@@ -41,7 +41,7 @@ def limiting(found: Search) -> tuple[str, ...]:
 
 
 def conclusions(
-    verdict: Verdict, found: Search, findings: Sequence[Finding], causes: Sequence[Cause]
+    verdict: Verdict, found: ErrorSearch, findings: Sequence[Finding], causes: Sequence[PossibleCause]
 ) -> list[str]:
     """Conclusions in words, the most important first."""
     result = _headline(verdict, found, findings, causes)
@@ -68,7 +68,7 @@ def conclusions(
 
 
 def _headline(
-    verdict: Verdict, found: Search, findings: Sequence[Finding], causes: Sequence[Cause]
+    verdict: Verdict, found: ErrorSearch, findings: Sequence[Finding], causes: Sequence[PossibleCause]
 ) -> list[str]:
     if verdict == "failed":
         return [
@@ -103,7 +103,7 @@ def _headline(
     return _named(findings, causes)
 
 
-def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
+def _named(findings: Sequence[Finding], causes: Sequence[PossibleCause]) -> list[str]:
     result = []
     possible = [c for c in causes if c.possible]
     for one in findings:

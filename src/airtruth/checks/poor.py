@@ -39,7 +39,7 @@ _COVERED_FT: Final = (10.0, 80000.0)
 
 
 @dataclass(frozen=True)
-class Record:
+class RunMeasures:
     """Measures of one run.
 
     Attributes
@@ -59,7 +59,7 @@ class Record:
     severe_m_s: float
 
 
-def measured(batch: Batch) -> list[Record]:
+def measured(batch: Batch) -> list[RunMeasures]:
     """Measures of the first runs of a batch.
 
     Parameters
@@ -80,7 +80,7 @@ def measured(batch: Batch) -> list[Record]:
     moving = np.ptp(c["q_rad_s"], axis=1) > 0.0
     share = np.where(moving, share, 1.0)
     rows = zip(batch.run_ids, share.tolist(), rms.tolist(), gusts.tolist(), severe.tolist(), strict=False)
-    return [Record(*row) for row in rows]
+    return [RunMeasures(*row) for row in rows]
 
 
 def _unexplained(elevator: Array, q: Array, dt_s: float) -> Array:
@@ -127,7 +127,7 @@ def _without_line(x: Array) -> Array:
     return np.asarray(x - (x @ line) @ line.T)
 
 
-def words(records: Sequence[Record]) -> Iterator[str]:
+def words(records: Sequence[RunMeasures]) -> Iterator[str]:
     """Sentences about runs that determine little: the reason, then the figures of the worst of them."""
     drowned = [one for one in records if one.share < FLOOR]
     if drowned:
@@ -150,8 +150,8 @@ def words(records: Sequence[Record]) -> Iterator[str]:
         )
 
 
-def _some(bad: Sequence[Record], all_of_them: Sequence[Record]) -> str:
+def _some(bad: Sequence[RunMeasures], all_of_them: Sequence[RunMeasures]) -> str:
     return "" if len(all_of_them) == 1 else f" in {len(bad)} of {len(all_of_them)} runs"
 
 
-__all__ = ["FLOOR", "MOST_RUNS", "Record", "measured", "words"]
+__all__ = ["FLOOR", "MOST_RUNS", "RunMeasures", "measured", "words"]

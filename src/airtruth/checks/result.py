@@ -52,7 +52,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Cause:
+class PossibleCause:
     """A set of errors that was compared.
 
     Attributes
@@ -94,7 +94,7 @@ class CheckResult:
     verdict: Verdict
     run_ids: tuple[str, ...]
     findings: tuple[Finding, ...]
-    causes: tuple[Cause, ...]
+    causes: tuple[PossibleCause, ...]
     statistic: float
     degrees: int
     p_value: float
@@ -104,7 +104,7 @@ class CheckResult:
     forced: tuple[str, ...] = ()
 
     @property
-    def possible(self) -> tuple[Cause, ...]:
+    def possible(self) -> tuple[PossibleCause, ...]:
         """Sets that the records do not exclude, the cheapest first."""
         return tuple(c for c in self.causes if c.possible)
 
@@ -241,7 +241,7 @@ def undetermined(result: CheckResult) -> tuple[str, ...]:
     return tuple(f.name for f in result.findings if f.std > UNDETERMINED * within.get(f.name, math.inf))
 
 
-def _judged(one: Cause, result: CheckResult) -> str:
+def _judged(one: PossibleCause, result: CheckResult) -> str:
     if one.possible:
         return "possible"
     names = {f.name for f in one.errors}
@@ -265,9 +265,9 @@ def _size(one: Finding) -> str:
 
 
 __all__ = [
-    "Cause",
     "CheckResult",
     "Finding",
+    "PossibleCause",
     "State",
     "Verdict",
     "digits_of",

@@ -91,7 +91,7 @@ def journal(verbose: bool, file: Path | None) -> Iterator[None]:
     """
     handlers: list[logging.Handler] = []
     if verbose and sys.stderr is not None:
-        shown = _Stream(sys.stderr)
+        shown = _JournalStream(sys.stderr)
         shown.setFormatter(_Elapsed())
         handlers.append(shown)
     if file is not None:
@@ -123,7 +123,7 @@ def journal(verbose: bool, file: Path | None) -> Iterator[None]:
 
 def is_verbose() -> bool:
     """Whether the journal of this command is shown."""
-    return any(isinstance(handler, _Stream) for handler in LOGGER.handlers)
+    return any(isinstance(handler, _JournalStream) for handler in LOGGER.handlers)
 
 
 def _begin() -> None:
@@ -151,7 +151,7 @@ class _Elapsed(logging.Formatter):
         return f"airtruth: {record.created - self._started:8.2f} s  {record.getMessage()}"
 
 
-class _Stream(logging.StreamHandler[TextIO]):
+class _JournalStream(logging.StreamHandler[TextIO]):
     """stderr; a closed one must not end a command that only reports."""
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - name of logging

@@ -109,7 +109,7 @@ def plan(
         ),
     ] = None,
     amplitude_deg: Annotated[
-        float, typer.Option(help="Largest deviation of the elevator from its trim [deg].")
+        float, typer.Option(help="Largest deviation of the surfaces from their trim [deg].")
     ] = 2.0,
     rate_deg_s: Annotated[
         float | None, typer.Option(help="Largest rate of the surface [deg/s]; default: that of the servo.")
@@ -146,7 +146,7 @@ def plan(
         require_names(aircraft=aircraft, effects=[] if split is None else _listed("--split", split))
         from airtruth.api.plans import base_campaign
         from airtruth.design import PlanOptions
-        from airtruth.design.from_files import Stated, planned_from
+        from airtruth.design.from_files import Request, planned_from
 
     predicts = split is None and derivative is None and trace is None
     _require_of(context, predicts)
@@ -159,7 +159,9 @@ def plan(
         print_result(_json(forecasts) if json_ else _text(forecasts))
         return
     _require_motion(motion, _listed("--derivative", derivative), split)
-    stated = Stated(_listed("--split", split), _sizes(size or []), _listed("--derivative", derivative), trace)
+    stated = Request(
+        _listed("--split", split), _sizes(size or []), _listed("--derivative", derivative), trace
+    )
     limits = _limits(amplitude_deg, rate_deg_s, alpha_deg, load_factor, length_s, airspeed_percent)
     options = PlanOptions(limits, records, seed)
     with status("plan", quiet) as step:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from airtruth.design.bench import Bench, Flown
 from airtruth.design.flight import fitted_of, model_of
-from airtruth.design.narrow_result import Quantity
-from airtruth.design.separation import Model, beyond, flown_by, refitted
+from airtruth.design.narrow_result import ForecastQuantity
+from airtruth.design.separation import FilterSetting, beyond, flown_by, refitted
 from airtruth.effects.increment import SIGNAL_NAMES, Increment, Memory, Shape, increment
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
@@ -140,7 +140,7 @@ class BandQuestion:
         """The purpose of the input."""
         return "the input that narrows the band of " + " and of ".join(e.variant for e in self.accepted)
 
-    def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> Band:
+    def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> IncrementBand:
         """Their bands at a flight condition.
 
         Parameters
@@ -157,7 +157,7 @@ class BandQuestion:
             common = np.zeros(SHORT_PERIOD.common.size)
             common[SHORT_PERIOD.common.derivatives] = root @ rng.standard_normal(6)
             draws += [(1.0 + size, common), (1.0 - size, -common)]
-        return Band(
+        return IncrementBand(
             model=model_of(bench.aircraft, campaign, bench.condition, fitted_of(records)),
             learned=tuple(learned(e, bench.plant) for e in self.accepted),
             draws=tuple(draws),
@@ -165,7 +165,7 @@ class BandQuestion:
 
 
 @dataclass(frozen=True)
-class Band:
+class IncrementBand:
     """Bands of learned increments at a flight condition; a `airtruth.design.search.Merit`.
 
     Attributes
@@ -175,7 +175,7 @@ class Band:
     draws : factor on the increments and (common,) parameters of the aircraft each, in pairs about the declared ones.
     """
 
-    model: Model
+    model: FilterSetting
     learned: tuple[Learned, ...]
     draws: tuple[tuple[float, Array], ...]
 
@@ -258,7 +258,7 @@ class Band:
         information = model.records * (across @ across.T) + np.diag(hypothesis.size_precision)
         return np.asarray(np.linalg.pinv(information, hermitian=True))
 
-    def quantities(self, flown: Flown, reference: Flown) -> tuple[Quantity, ...]:
+    def quantities(self, flown: Flown, reference: Flown) -> tuple[ForecastQuantity, ...]:
         """The points of the increments with their standard errors by an input and by the reference."""
         ends = [self.expected(f, final=True) for f in (flown, reference)]
         found = []
@@ -267,7 +267,7 @@ class Band:
             for i in range(len(own.known)):
                 at = float(own.at[i]) if own.at.size else None
                 figures = (float(x[i]) for x in (own.value, own.known, after, compared))
-                found.append(Quantity(own.effect.variant, at, *figures))
+                found.append(ForecastQuantity(own.effect.variant, at, *figures))
         return tuple(found)
 
 
@@ -275,4 +275,4 @@ def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
-__all__ = ["COEFFICIENTS", "DRAWS", "Band", "BandQuestion", "Learned", "learned"]
+__all__ = ["COEFFICIENTS", "DRAWS", "BandQuestion", "IncrementBand", "Learned", "learned"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.design.bench import Flown
 from airtruth.design.question import Hypothesised, typical_sizes
-from airtruth.design.separation import Distance, Experiment, Member, Model
+from airtruth.design.separation import Distance, Experiment, FilterSetting, Member
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import TraceRecord
 
@@ -53,7 +53,7 @@ class Criterion:
     unknowns : draws of what is not known, in pairs of opposite sign.
     """
 
-    model: Model
+    model: FilterSetting
     members: tuple[Member, ...]
     std: tuple[Array, ...]
     unknowns: tuple[Unknown, ...]
@@ -105,7 +105,11 @@ class Criterion:
 
 
 def criterion(
-    model: Model, hypotheses: Sequence[Hypothesised], reference: TraceRecord, covariance: Array, seed: int
+    model: FilterSetting,
+    hypotheses: Sequence[Hypothesised],
+    reference: TraceRecord,
+    covariance: Array,
+    seed: int,
 ) -> Criterion:
     """Separations of hypotheses, of which those without sizes imitate the first on a record.
 

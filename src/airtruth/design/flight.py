@@ -16,7 +16,7 @@ from airtruth.aircraft import load as load_aircraft
 from airtruth.arguments import require_whole
 from airtruth.design.bench import Bench
 from airtruth.design.limits import Limits
-from airtruth.design.separation import Model
+from airtruth.design.separation import FilterSetting
 from airtruth.errors import AirtruthError, ConfigurationError
 from airtruth.physics.gust_figures import GustScales, gust_scales
 from airtruth.simulation.campaign.file import NO_GUST, Campaign, ConditionTable
@@ -185,7 +185,7 @@ def gusts(campaign: Campaign, at: Condition) -> GustScales:
     )
 
 
-def model_of(aircraft: Aircraft, campaign: Campaign, at: Condition, records: int) -> Model:
+def model_of(aircraft: Aircraft, campaign: Campaign, at: Condition, records: int) -> FilterSetting:
     """The tracer's filter for flights to come: sensors of a campaign, its gusts at a condition, and equal records.
 
     Parameters
@@ -195,7 +195,7 @@ def model_of(aircraft: Aircraft, campaign: Campaign, at: Condition, records: int
     sensors = campaign.sensors.apply(aircraft.file.sensors)
     file = aircraft.file.model_copy(update={"sensors": sensors})
     flown_with = aircraft.model_copy(update={"file": file})
-    return Model(
+    return FilterSetting(
         settings=settings_of(flown_with, _THRUST_STD),
         declared=declared_change(flown_with),
         gust_m_s=gusts(campaign, at).sigma_w_m_s,

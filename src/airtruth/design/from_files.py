@@ -45,7 +45,7 @@ _LOG_HZ: Final = 50.0
 
 
 @dataclass(frozen=True)
-class Stated:
+class Request:
     """The question as a user states it; without a statement, a trace asks.
 
     Attributes
@@ -64,7 +64,7 @@ class Stated:
 
 def planned_from(
     campaign: Path | Campaign | None,
-    stated: Stated,
+    stated: Request,
     aircraft: str | None,
     options: PlanOptions,
     out: Path | None = None,
@@ -114,7 +114,7 @@ def planned_from(
     return result
 
 
-def _question(stated: Stated, answer_file: Path | None) -> Asked | LateralQuestion:
+def _question(stated: Request, answer_file: Path | None) -> Asked | LateralQuestion:
     if stated.split and stated.derivatives:
         raise ConfigurationError("plan: --split and --derivative exclude each other; state one of them")
     if stated.sizes and not stated.split:
@@ -225,4 +225,4 @@ def _stated(declared: Aircraft) -> str:
     return folder.name if shipped else str(folder)
 
 
-__all__ = ["Stated", "planned_from"]
+__all__ = ["Request", "planned_from"]

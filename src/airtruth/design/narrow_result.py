@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ForecastQuantity:
     """A derivative, or a point of a learned increment.
 
     Attributes
@@ -70,7 +70,7 @@ class NarrowRow:
 
 
 @dataclass(frozen=True)
-class Histories:
+class BandHistories:
     """The planned flight in calm air.
 
     Attributes
@@ -101,10 +101,10 @@ class NarrowResult(PlannedCampaign):
 
     targets: tuple[str, ...]
     known: tuple[float, ...]
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[ForecastQuantity, ...]
     rows: tuple[NarrowRow, ...]
     reference: NarrowRow
-    histories: Histories
+    histories: BandHistories
 
     @property
     def best(self) -> NarrowRow:
@@ -274,4 +274,4 @@ def _without_nan(row: dict[str, Any]) -> dict[str, Any]:
     return {key: None if isinstance(x, float) and not np.isfinite(x) else x for key, x in row.items()}
 
 
-__all__ = ["Histories", "NarrowResult", "NarrowRow", "Quantity"]
+__all__ = ["BandHistories", "ForecastQuantity", "NarrowResult", "NarrowRow"]

@@ -13,8 +13,8 @@ from airtruth.aircraft import Aircraft
 from airtruth.aircraft.neutral import effective
 from airtruth.design.bench import Bench, Flown
 from airtruth.design.flight import LEAST_RECORDS, PlanOptions, best_condition, flying, in_words, planning
-from airtruth.design.narrow_result import Histories, NarrowResult, NarrowRow, Quantity
-from airtruth.design.search import REFERENCE, Rated, Search, Setup, run
+from airtruth.design.narrow_result import BandHistories, ForecastQuantity, NarrowResult, NarrowRow
+from airtruth.design.search import REFERENCE, InputSearch, Rated, Setup, run
 from airtruth.errors import ConfigurationError
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
@@ -46,7 +46,7 @@ class Targets(Protocol):
     def rate(self, flown: Flown, *, final: bool = False) -> Array | None:
         """(targets,) known over expected standard error [-]; None if a motion is lost."""
 
-    def quantities(self, flown: Flown, reference: Flown) -> tuple[Quantity, ...]:
+    def quantities(self, flown: Flown, reference: Flown) -> tuple[ForecastQuantity, ...]:
         """The standard errors by an input and by the reference."""
 
 
@@ -80,7 +80,7 @@ class _Asked:
         bench = Bench(self.aircraft, self.campaign, condition, limits)
         targets = self.question.at(bench, self.campaign, self.records, self.options.seed)
         bench.allow_for(effective(change) for change in targets.changes)
-        search = Search(bench, targets, limits.rise_s)
+        search = InputSearch(bench, targets, limits.rise_s)
         reference = search.rate(REFERENCE, search.reference())
         if reference is None:
             raise ConfigurationError(
@@ -168,10 +168,10 @@ def _row(rated: Rated, targets: Targets) -> NarrowRow:
     )
 
 
-def _histories(flown: Flown, reference: Flown) -> Histories:
+def _histories(flown: Flown, reference: Flown) -> BandHistories:
     elevator, compared = (f.channels["elevator_rad"] for f in (flown, reference))
     alpha = flown.channels["alpha_rad"]
-    return Histories(
+    return BandHistories(
         t_s=flown.record.signals.dt_s * np.arange(len(elevator), dtype=np.float64),
         elevator_rad=elevator - elevator[0],
         reference_rad=compared - compared[0],

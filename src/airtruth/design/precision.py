@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airtruth.design.bench import Bench, Flown
 from airtruth.design.flight import gusts
 from airtruth.design.information import LinearExperiment, sensor_noise
-from airtruth.design.narrow_result import Quantity
+from airtruth.design.narrow_result import ForecastQuantity
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.physics.terms import Change, DerivativeTerm
@@ -53,8 +53,8 @@ class DerivativeQuestion:
             )
             if other is not None:
                 raise ConfigurationError(
-                    f"plan: derivative {name!r} belongs to the {other.heading.lower()}, for which no input is searched; "
-                    f"`airtruth plan CAMPAIGN.toml --motion {other.name}` predicts the accuracy of a campaign"
+                    f"plan: derivative {name!r} belongs to the {other.heading.lower()}, and an input determines those of one "
+                    "motion; plan the derivatives of each motion by a command of its own"
                 )
             if name not in LONGITUDINAL.parameters:
                 raise ConfigurationError(
@@ -171,14 +171,14 @@ class Precision:
         each = [np.diag(self.experiment.least_covariance(flown.channels, self.theta + d)) for d in draws]
         return np.asarray(np.mean(each, axis=0)[self._index] / self.records)
 
-    def quantities(self, flown: Flown, reference: Flown) -> tuple[Quantity, ...]:
+    def quantities(self, flown: Flown, reference: Flown) -> tuple[ForecastQuantity, ...]:
         """The derivatives with their standard errors by an input and by the reference."""
         index = self._index
         columns = [self.theta[index], self.known]
         columns += [np.sqrt(self._variance(f, final=True)) for f in (flown, reference)]
         columns += [self.experiment.linear_error(f.channels, self.theta)[index] for f in (flown, reference)]
         rows = np.stack(columns, axis=1).tolist()
-        return tuple(Quantity(name, None, *row) for name, row in zip(self.names, rows, strict=True))
+        return tuple(ForecastQuantity(name, None, *row) for name, row in zip(self.names, rows, strict=True))
 
 
 __all__ = ["DRAWS", "DerivativeQuestion", "Precision"]

@@ -85,7 +85,7 @@ class Rated:
         return float(self.merit.min())
 
 
-class Search(Generic[C]):
+class InputSearch(Generic[C]):
     """Rates inputs at one flight condition.
 
     Parameters
@@ -145,7 +145,7 @@ class Search(Generic[C]):
 class Setup(Generic[C]):
     """A search at a flight condition with the input that others are compared with."""
 
-    search: Search[C]
+    search: InputSearch[C]
     reference: Rated
 
     def finals(self, rated: Iterable[Rated]) -> tuple[list[Rated], Rated]:
@@ -163,7 +163,7 @@ class Setup(Generic[C]):
         return sorted(finals, key=lambda r: -r.value), reference
 
 
-def run(search: Search[C], seed: int, step: Step = lambda text: None) -> dict[str, Rated]:
+def run(search: InputSearch[C], seed: int, step: Step = lambda text: None) -> dict[str, Rated]:
     """Search every family; the best input of each.
 
     Parameters
@@ -188,7 +188,7 @@ def run(search: Search[C], seed: int, step: Step = lambda text: None) -> dict[st
     return search.best
 
 
-def _multisteps(search: Search[C], seed: int) -> None:
+def _multisteps(search: InputSearch[C], seed: int) -> None:
     rng = np.random.default_rng([seed, 1])
     length, dt, shortest = search.bench.limits.length_s, search.bench.dt_s, search.shortest_s
     start = max(search.best.values(), key=lambda r: r.value, default=None)
@@ -206,7 +206,7 @@ def _multisteps(search: Search[C], seed: int) -> None:
         parent = child if better else parent
 
 
-def _multisines(search: Search[C], seed: int) -> None:
+def _multisines(search: InputSearch[C], seed: int) -> None:
     rng = np.random.default_rng([seed, 2])
     length = search.bench.limits.length_s
     band = (_LOWEST_PERIODS / length, 0.5 / search.shortest_s)
@@ -229,4 +229,4 @@ def _multisines(search: Search[C], seed: int) -> None:
             parent, weights = child, tried
 
 
-__all__ = ["MULTISINE", "MULTISTEP", "REFERENCE", "Merit", "Rated", "Search", "Setup", "run"]
+__all__ = ["MULTISINE", "MULTISTEP", "REFERENCE", "InputSearch", "Merit", "Rated", "Setup", "run"]

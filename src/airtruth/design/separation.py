@@ -71,7 +71,7 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Model:
+class FilterSetting:
     """Common part of the hypotheses.
 
     Attributes
@@ -121,7 +121,7 @@ class Experiment:
     record : the record; its outputs are not used.
     """
 
-    def __init__(self, model: Model, record: TraceRecord) -> None:
+    def __init__(self, model: FilterSetting, record: TraceRecord) -> None:
         self.model = model
         self.record = flown_by(
             model, record, model.hypothesis((), record), np.zeros(0), np.zeros(SHORT_PERIOD.common.size)
@@ -194,7 +194,7 @@ class Experiment:
 
 
 def flown_by(
-    model: Model, record: TraceRecord, hypothesis: Hypothesis, sizes: Array, common: Array
+    model: FilterSetting, record: TraceRecord, hypothesis: Hypothesis, sizes: Array, common: Array
 ) -> TraceRecord:
     """The record with the outputs that the tracer's model has under a hypothesis, in calm air.
 
@@ -255,4 +255,4 @@ def clipped(effect: Effect, sizes: Array) -> Array:
     return np.asarray(np.clip(sizes, low, high))
 
 
-__all__ = ["Distance", "Experiment", "Member", "Model", "beyond", "clipped", "flown_by", "refitted"]
+__all__ = ["Distance", "Experiment", "FilterSetting", "Member", "beyond", "clipped", "flown_by", "refitted"]

@@ -25,8 +25,8 @@ from airtruth.design.flight import (
     planning,
 )
 from airtruth.design.question import Hypothesised, at_point
-from airtruth.design.search import REFERENCE, Rated, Search, Setup, run
-from airtruth.design.separation import Model
+from airtruth.design.search import REFERENCE, InputSearch, Rated, Setup, run
+from airtruth.design.separation import FilterSetting
 from airtruth.design.split_result import InputRow, Prediction, SplitResult, split_probability
 from airtruth.errors import ConfigurationError
 from airtruth.simulation.campaign.file import Campaign
@@ -174,7 +174,7 @@ def _at(
         else None
     )
     resolved = [h if point is None else at_point(h, point) for h in hypotheses]
-    search = Search(bench, _nothing(model), limits.rise_s)
+    search = InputSearch(bench, _nothing(model), limits.rise_s)
     flown = bench.fly(search.reference())
     if flown is None:
         raise ConfigurationError(
@@ -190,7 +190,7 @@ def _at(
     return Setup(search, reference)
 
 
-def _nothing(model: Model) -> Criterion:
+def _nothing(model: FilterSetting) -> Criterion:
     return Criterion(model, (), (), ())
 
 

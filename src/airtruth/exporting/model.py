@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class OperatingPoint:
+class FlightPoint:
     """The steady flight about which a model is linear, and the aircraft in it.
 
     Attributes
@@ -51,7 +51,7 @@ class OperatingPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LateralPoint(OperatingPoint):
+class LateralFlightPoint(FlightPoint):
     """The same for the lateral-directional motion; its trim has alpha_rad and theta_rad.
 
     Attributes
@@ -70,7 +70,7 @@ Matrices = tuple[Array, Array, Array, Array]
 """A, B, C and D."""
 
 
-def _short_period(theta: Array, at: OperatingPoint) -> Matrices:
+def _short_period(theta: Array, at: FlightPoint) -> Matrices:
     """M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2) and (3); az in m/s2."""
     scale = short_period.scale(
         at.wing_area_m2, at.chord_m, at.mass_kg, at.inertia_yy_kg_m2, at.airspeed_m_s, at.density_kg_m3
@@ -80,15 +80,15 @@ def _short_period(theta: Array, at: OperatingPoint) -> Matrices:
     return a, b[:, None], np.vstack([np.eye(2), row[:2]]), np.array([[0.0], [0.0], [row[2]]])
 
 
-def _lateral(theta: Array, at: OperatingPoint) -> Matrices:
+def _lateral(theta: Array, at: FlightPoint) -> Matrices:
     """V. Klein and E. A. Morelli, 3.2 and 3.3, see `airtruth.physics.lateral`; ay in m/s2."""
-    if not isinstance(at, LateralPoint):
+    if not isinstance(at, LateralFlightPoint):
         raise TypeError("the lateral motion needs a LateralPoint")
     s = lateral_scale(at, at.airspeed_m_s, at.density_kg_m3, at.trim["alpha_rad"], at.trim["theta_rad"])
     return lateral_system(theta, s)
 
 
-SYSTEMS: Final[Mapping[str, Callable[[Array, OperatingPoint], Matrices]]] = MappingProxyType(
+SYSTEMS: Final[Mapping[str, Callable[[Array, FlightPoint], Matrices]]] = MappingProxyType(
     {LONGITUDINAL.name: _short_period, LATERAL.name: _lateral}
 )
 """Name of a motion -> its matrices from derivatives and operating point: states, inputs and outputs in the order of the
@@ -110,7 +110,7 @@ class LinearModel:
     """
 
     motion: Motion
-    point: OperatingPoint
+    point: FlightPoint
     derivatives: Array
     derivative_covariance: Array
     source: str
@@ -247,4 +247,4 @@ def _plain(values: Array) -> Any:
     return [float(x) if np.isfinite(x) else None for x in values]
 
 
-__all__ = ["SYSTEMS", "LateralPoint", "LinearModel", "OperatingPoint"]
+__all__ = ["SYSTEMS", "FlightPoint", "LateralFlightPoint", "LinearModel"]

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.exporting.model import LateralPoint, LinearModel, OperatingPoint
-from airtruth.identification.record_constants import Constants, LateralValues
+from airtruth.exporting.model import FlightPoint, LateralFlightPoint, LinearModel
+from airtruth.identification.record_constants import LateralValues, RecordConstants
 from airtruth.logs.names import ESTIMATES
 from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.physics.atmosphere import density_kg_m3
@@ -34,7 +34,7 @@ _CONDITION: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Motion -> columns of a file of estimates with the flight condition."""
 _CONSTANTS: Final[Mapping[str, tuple[str, ...]]] = {
-    LONGITUDINAL.name: tuple(f.name for f in fields(Constants)),
+    LONGITUDINAL.name: tuple(f.name for f in fields(RecordConstants)),
     LATERAL.name: tuple(f.name for f in fields(LateralValues)),
 }
 """Motion -> constants of the aircraft."""
@@ -123,7 +123,7 @@ def _of_estimates(file: Path, method: str | None, run_id: str | None) -> LinearM
     at = {name: float(own[name].mean()) for name in condition}
     trim = {name: at.pop(name) for name in condition if name not in _AIR}
     known = at | {name: float(constants[name]) for name in _CONSTANTS[motion.name]}
-    point = LateralPoint(**known, trim=trim) if motion is LATERAL else OperatingPoint(**known, trim=trim)
+    point = LateralFlightPoint(**known, trim=trim) if motion is LATERAL else FlightPoint(**known, trim=trim)
     of = f"run {runs[0]}" if len(runs) == 1 else f"mean of {len(runs)} converged runs"
     return LinearModel(
         motion=motion,
@@ -190,7 +190,7 @@ def _of_aircraft(aircraft: Aircraft, airspeed_m_s: float, altitude_m: float) -> 
     derivatives = declared_derivatives(aircraft, at)
     constants = aircraft.constants
     trim = {} if at is None else {"alpha_rad": at.alpha_rad, "elevator_rad": at.elevator_rad}
-    point = OperatingPoint(
+    point = FlightPoint(
         airspeed_m_s=airspeed_m_s,
         density_kg_m3=density,
         wing_area_m2=constants.wing_area_m2,

@@ -23,7 +23,7 @@ _SHOWN: Final = 60
 
 
 @dataclass(frozen=True)
-class Table:
+class HeaderTable:
     """Names and units of the columns of a table, and its first row.
 
     Attributes
@@ -52,7 +52,9 @@ def cells_of(line: str, delimiter: str) -> list[str]:
         return line.split(delimiter)
 
 
-def find_table(lines: Sequence[str], first: int, delimiter: str, decimal: str, header: bool | None) -> Table:
+def find_table(
+    lines: Sequence[str], first: int, delimiter: str, decimal: str, header: bool | None
+) -> HeaderTable:
     """The table of a file.
 
     The rows in the middle of the file say how many columns there are, and which of them hold numbers. The values begin
@@ -79,7 +81,7 @@ def find_table(lines: Sequence[str], first: int, delimiter: str, decimal: str, h
     start = next((i for i in head if _is_row(cells_of(lines[i], delimiter), numeric, whole, decimal)), None)
     if header is False or (header is None and start == first):
         raw = len(cells_of(lines[first], delimiter))
-        return Table(first, (), (), max(width, raw))
+        return HeaderTable(first, (), (), max(width, raw))
     before = [first] if header is True or start is None else [i for i in head if i < start]
     words = {i: _words(lines[i], delimiter, width, whole) for i in before}
     fitting = [i for i in before if (w := words[i]) is not None and not any(is_number(c, decimal) for c in w)]
@@ -103,7 +105,7 @@ def find_table(lines: Sequence[str], first: int, delimiter: str, decimal: str, h
             units, after = below, after + 1
     begin = rows[after] if after < len(rows) else len(lines)
     prose = max((i for i in before if i < at), default=-1)
-    return Table(begin, tuple(names), tuple(units), max(whole, len(names)), prose)
+    return HeaderTable(begin, tuple(names), tuple(units), max(whole, len(names)), prose)
 
 
 def _width(cells: Sequence[str]) -> int:
@@ -180,4 +182,4 @@ def is_number(text: str, decimal: str) -> bool:
     return True
 
 
-__all__ = ["WHITESPACE", "Table", "cells_of", "find_table", "is_number"]
+__all__ = ["WHITESPACE", "HeaderTable", "cells_of", "find_table", "is_number"]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from airtruth.errors import ConfigurationError, StoreError, reason
 from airtruth.foreign.dates import seconds_of_text
 from airtruth.foreign.encoding import decoded
-from airtruth.foreign.header import WHITESPACE, Table, cells_of, find_table, is_number
+from airtruth.foreign.header import WHITESPACE, HeaderTable, cells_of, find_table, is_number
 from airtruth.foreign.source import Source, table_source
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def names_a_comment(line: str) -> bool:
     return line.lstrip().startswith(("#", "%"))
 
 
-def _frame(path: Path, text: str | None, layout: TextFormat, table: Table) -> pd.DataFrame:
+def _frame(path: Path, text: str | None, layout: TextFormat, table: HeaderTable) -> pd.DataFrame:
     """Cells of the table, from its text, or from the file."""
     import pandas as pd
 
@@ -131,7 +131,7 @@ def _frame(path: Path, text: str | None, layout: TextFormat, table: Table) -> pd
         raise StoreError(f"{path}: is not a table ({reason(error)}); check [source] delimiter") from None
 
 
-def _named_columns(path: Path, frame: pd.DataFrame, table: Table) -> pd.DataFrame:
+def _named_columns(path: Path, frame: pd.DataFrame, table: HeaderTable) -> pd.DataFrame:
     """Columns that have names; further ones are empty, because each row ends with a delimiter."""
     count = len(table.names) or frame.shape[1]
     if not frame.iloc[:, count:].isna().all(axis=None):
@@ -158,7 +158,7 @@ def _values(values: NDArray[Any], decimal: str) -> tuple[NDArray[Any], bool]:
     return np.array(cells, dtype=object), False
 
 
-def _require_whole_rows(path: Path, rows: list[str], table: Table, last: NDArray[Any]) -> None:
+def _require_whole_rows(path: Path, rows: list[str], table: HeaderTable, last: NDArray[Any]) -> None:
     """Refuse a row between blanks that lacks a value: its values belong to other columns."""
     import pandas as pd
 
@@ -173,7 +173,7 @@ def _require_whole_rows(path: Path, rows: list[str], table: Table, last: NDArray
             )
 
 
-def _prose(path: Path, table: Table) -> list[str]:
+def _prose(path: Path, table: HeaderTable) -> list[str]:
     if table.skipped < 0:
         return []
     return [f"{path.name}: {table.skipped + 1} lines before the names of the columns were left out"]

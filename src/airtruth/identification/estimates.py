@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from airtruth.identification.covariance_columns import correlation_columns
-from airtruth.identification.record_constants import Constants
+from airtruth.identification.record_constants import RecordConstants
 from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_modes
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.short_period import Scale, modal, system
@@ -277,7 +277,7 @@ def half_width(confidence: float) -> float:
     return float(ndtri(0.5 + 0.5 * confidence))
 
 
-def estimates_table(estimates: Estimates, constants: Constants | None = None) -> pd.DataFrame:
+def estimates_table(estimates: Estimates, constants: RecordConstants | None = None) -> pd.DataFrame:
     """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status.
 
     Behind them, correlations of the derivatives (`correlation_columns`) and, with the constants, the flight condition:

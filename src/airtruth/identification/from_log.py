@@ -26,8 +26,8 @@ from airtruth.identification.lateral.methods import curvature_of
 from airtruth.identification.lateral.observation import assumed
 from airtruth.identification.methods import Method
 from airtruth.identification.options import Options
-from airtruth.identification.record_constants import Part, differing, with_constants
-from airtruth.identification.result import Source
+from airtruth.identification.record_constants import EqualRuns, differing, with_constants
+from airtruth.identification.result import LogSource
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.sources import IN_MEMORY
 from airtruth.logs.store import read_log
@@ -70,9 +70,9 @@ class FromLog:
     dt_s: float = 0.0
     noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
-    measures: list[poor.Record] = field(default_factory=list)
-    origin: Source | None = None
-    parts: list[Part] = field(default_factory=list)
+    measures: list[poor.RunMeasures] = field(default_factory=list)
+    origin: LogSource | None = None
+    parts: list[EqualRuns] = field(default_factory=list)
     estimates: dict[str, Estimates] = field(default_factory=dict)
     stated: dict[str, list[tuple[str, float, float]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -165,7 +165,7 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
     if isinstance(entry, Path):
         with (task.folder / entry).open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-        found.origin = Source(entry.name, digest, len(log.run_ids))
+        found.origin = LogSource(entry.name, digest, len(log.run_ids))
     if task.joint:
         found.parts = parts
         return found

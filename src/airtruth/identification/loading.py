@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError
 from airtruth.identification.estimates import Estimates, Status, mean_scale
-from airtruth.identification.record_constants import Part
+from airtruth.identification.record_constants import EqualRuns
 from airtruth.physics.composition import cg_transfer
 
 Array = NDArray[np.float64]
 
 
-def mean_cg(groups: Mapping[float | None, Sequence[Part]]) -> float | None:
+def mean_cg(groups: Mapping[float | None, Sequence[EqualRuns]]) -> float | None:
     """Mean centre of gravity over the runs [chords]; None if they state none."""
     runs = {cg: sum(len(p.batch.run_ids) for p in parts) for cg, parts in groups.items() if cg is not None}
     return sum(cg * n for cg, n in runs.items()) / sum(runs.values()) if runs else None

@@ -19,7 +19,7 @@ from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 
 
 @dataclass(frozen=True)
-class Constants:
+class RecordConstants:
     """Constants of an aircraft: S [m2], c [m], m [kg], Iyy [kg m2]."""
 
     wing_area_m2: float
@@ -29,7 +29,7 @@ class Constants:
 
 
 @dataclass(frozen=True)
-class LateralValues(Constants):
+class LateralValues(RecordConstants):
     """Constants of an aircraft whose lateral-directional motion is identified: further b [m], Ixx, Izz, Ixz [kg m2]."""
 
     span_m: float
@@ -49,7 +49,7 @@ REFERENCE: Final = ("wing_area_m2", "chord_m", "span_m")
 
 
 @dataclass(frozen=True)
-class Part:
+class EqualRuns:
     """Runs of one length, rate and loading.
 
     Attributes
@@ -103,7 +103,9 @@ def of_run(constants: AircraftConstants, metadata: Mapping[str, object], run_id:
     if isinstance(constants, Aircraft):  # its declared sensors remain
         return constants.model_copy(update={"constants": constants.constants.model_copy(update=known)})
     kind = (
-        LateralValues if all(name in known or stated_value(constants, name) for name in NAMES) else Constants
+        LateralValues
+        if all(name in known or stated_value(constants, name) for name in NAMES)
+        else RecordConstants
     )
     return kind(**{f.name: known.get(f.name, stated_value(constants, f.name)) for f in fields(kind)})
 
@@ -115,7 +117,7 @@ def stated_value(constants: object, name: str) -> float:
     return float(value) if value is not None else 0.0
 
 
-def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> Constants:
+def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> RecordConstants:
     """The constants that the identification of a motion needs, alone.
 
     Raises
@@ -123,7 +125,7 @@ def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> Co
     ConfigurationError
         If the aircraft lacks one that the lateral-directional motion needs, naming it.
     """
-    kind = LateralValues if motion is LATERAL else Constants
+    kind = LateralValues if motion is LATERAL else RecordConstants
     values = {f.name: stated_value(constants, f.name) for f in fields(kind)}
     if motion is LATERAL:
         lacking = [name for name, value in values.items() if not value > 0.0 and name not in _SIGNED]
@@ -144,7 +146,7 @@ def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> Co
 
 def with_constants(
     log: FlightLog, constants: AircraftConstants, motion: Motion = LONGITUDINAL
-) -> Iterator[Part]:
+) -> Iterator[EqualRuns]:
     """Batches of a log whose runs share their constants and centre of gravity.
 
     Raises
@@ -163,10 +165,10 @@ def with_constants(
             groups.setdefault(key, []).append(run)
             owners.setdefault(key, (own, cg))
         for key, runs in groups.items():
-            yield Part(batch if len(groups) == 1 else _some(batch, runs), *owners[key])
+            yield EqualRuns(batch if len(groups) == 1 else _some(batch, runs), *owners[key])
 
 
-def by_loading(parts: Sequence[Part]) -> dict[float | None, list[Part]]:
+def by_loading(parts: Sequence[EqualRuns]) -> dict[float | None, list[EqualRuns]]:
     """Parts of a joint estimate by their centre of gravity; mass and inertia may differ within a group.
 
     Raises
@@ -175,7 +177,7 @@ def by_loading(parts: Sequence[Part]) -> dict[float | None, list[Part]]:
         If reference lengths differ, or only some runs state a centre of gravity.
     """
     first = parts[0]
-    groups: dict[float | None, list[Part]] = {}
+    groups: dict[float | None, list[EqualRuns]] = {}
     for part in parts:
         for name in REFERENCE:
             a, b = (stated_value(one.constants, name) for one in (first, part))

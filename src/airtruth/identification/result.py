@@ -17,7 +17,7 @@ from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.declared_sensors import Taken, taken_out
 from airtruth.identification.estimates import Estimates, Parts, estimates_table
 from airtruth.identification.options import Options
-from airtruth.identification.record_constants import Constants, values_of
+from airtruth.identification.record_constants import RecordConstants, values_of
 from airtruth.logs.histories import Histories
 from airtruth.logs.sources import Logs
 from airtruth.physics.motion import LONGITUDINAL, Motion
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Source:
+class LogSource:
     """A log that was read from a file: its name, the SHA-256 of its bytes and its number of runs."""
 
     name: str
@@ -39,7 +39,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Settings:
+class IdentificationSettings:
     """The choices that decide the numbers of an identification.
 
     Attributes
@@ -55,7 +55,7 @@ class Settings:
     options: Options
     joint: bool
     aircraft: str
-    constants: Constants
+    constants: RecordConstants
     sensors: Taken = field(default_factory=dict)
     motion: Motion = LONGITUDINAL
 
@@ -84,7 +84,7 @@ class Settings:
 
 def settings_of(
     aircraft: AircraftConstants, options: Options, joint: bool, motion: Motion = LONGITUDINAL
-) -> Settings:
+) -> IdentificationSettings:
     """Settings of an identification of this aircraft.
 
     Raises
@@ -93,7 +93,9 @@ def settings_of(
         If the aircraft lacks a constant that the motion needs.
     """
     name = aircraft.name if isinstance(aircraft, Aircraft) else type(aircraft).__name__
-    return Settings(options, joint, name, values_of(aircraft, motion), taken_out(aircraft, motion), motion)
+    return IdentificationSettings(
+        options, joint, name, values_of(aircraft, motion), taken_out(aircraft, motion), motion
+    )
 
 
 RUNS_PER_FRAME: Final = 2000
@@ -117,11 +119,11 @@ class IdentificationResult:
     """
 
     estimates: tuple[Estimates, ...]
-    settings: Settings
+    settings: IdentificationSettings
     notes: tuple[str, ...]
     forced: tuple[str, ...]
     version: str
-    sources: tuple[Source, ...]
+    sources: tuple[LogSource, ...]
     logs: Logs | None = field(default=None, repr=False, compare=False)
     others: tuple[IdentificationResult, ...] = ()
 
@@ -276,11 +278,11 @@ class SpooledResult:
 
     parts: Parts
     methods: tuple[str, ...]
-    settings: Settings
+    settings: IdentificationSettings
     notes: tuple[str, ...]
     forced: tuple[str, ...]
     version: str
-    sources: tuple[Source, ...]
+    sources: tuple[LogSource, ...]
 
     def to_frame(self) -> pd.DataFrame:
         """`IdentificationResult.to_frame`; the memory holds all rows."""
@@ -297,7 +299,7 @@ class SpooledResult:
         return as_text(table_of(self.parts, self.forced, self.notes))
 
 
-def frames_of(parts: Parts, constants: Constants) -> Iterator[pd.DataFrame]:
+def frames_of(parts: Parts, constants: RecordConstants) -> Iterator[pd.DataFrame]:
     """Rows of contract 2 in frames of up to `RUNS_PER_FRAME` runs."""
     for estimates in parts():
         for first in range(0, len(estimates[0].run_ids), RUNS_PER_FRAME):
@@ -319,7 +321,7 @@ def table_of(parts: Parts, forced: Iterable[str], notes: Iterable[str]) -> Table
     return dataclasses.replace(tables.overview_of(parts), notes=(*overridden, *notes))
 
 
-def _frame(estimates: Sequence[Estimates], constants: Constants) -> pd.DataFrame:
+def _frame(estimates: Sequence[Estimates], constants: RecordConstants) -> pd.DataFrame:
     """Rows of several methods for the same runs: run by run, and of each run the methods in their order."""
     import pandas as pd
 

@@ -26,11 +26,11 @@ from airtruth.identification.from_log import FromLog, LogTask, results_of
 from airtruth.identification.loading import at_one_cg, mean_cg
 from airtruth.identification.methods import Method, chosen_methods
 from airtruth.identification.options import Options
-from airtruth.identification.record_constants import Part, by_loading
+from airtruth.identification.record_constants import EqualRuns, by_loading
 from airtruth.identification.result import (
     IdentificationResult,
-    Settings,
-    Source,
+    IdentificationSettings,
+    LogSource,
     SpooledResult,
     settings_of,
 )
@@ -235,19 +235,19 @@ class _Work:
 
     methods: Sequence[Method]
     options: Options
-    settings: Settings
+    settings: IdentificationSettings
     step: Callable[[int], None]
     keep: Callable[[Sequence[Estimates]], None]
     owners: Owners = field(default_factory=Owners)
-    parts: list[Part] = field(default_factory=list)
+    parts: list[EqualRuns] = field(default_factory=list)
     stated: dict[str, list[tuple[str, float, float]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     forced: list[str] = field(default_factory=list)
-    sources: list[Source] = field(default_factory=list)
+    sources: list[LogSource] = field(default_factory=list)
     noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
     curved: Counter[tuple[str, str]] = field(default_factory=Counter)
-    measures: list[poor.Record] = field(default_factory=list)
+    measures: list[poor.RunMeasures] = field(default_factory=list)
     runs: int = 0
     failed: int = 0
     dt_s: float = 0.0

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from airtruth.errors import LogError, StoreError
-from airtruth.identification.result import IdentificationResult, Settings, SpooledResult
+from airtruth.identification.result import IdentificationResult, IdentificationSettings, SpooledResult
 from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
 from airtruth.logs import ledger
 from airtruth.logs.names import ESTIMATES
@@ -46,7 +46,7 @@ def beside(path: Path, motion: Motion) -> Path:
 
 
 def require_mergeable(
-    path: Path | str, methods: Sequence[str], settings: Settings, *, force: bool = False
+    path: Path | str, methods: Sequence[str], settings: IdentificationSettings, *, force: bool = False
 ) -> None:
     """Refuse a file into which estimates by these methods with these settings cannot be merged.
 

@@ -166,7 +166,7 @@ class Channel(Strict):
         return bool(self.calibration) and isinstance(self.calibration[0][0], tuple)
 
 
-class Constant(Strict):
+class RecordConstant(Strict):
     """A fact of a record: a number above 0, or a column whose mean over the run is taken."""
 
     column: ColumnKey | None = None
@@ -181,7 +181,7 @@ class Constant(Strict):
         return self
 
 
-class Attitude(Strict):
+class AttitudeTable(Strict):
     """A quaternion of the attitude, from which theta_rad, phi_rad and psi_rad are computed.
 
     quaternion : four columns, the scalar first ("wxyz") or last ("xyzw").
@@ -220,14 +220,14 @@ class BodyVelocity(Strict):
 
 __all__ = [
     "TIME_UNITS",
-    "Attitude",
+    "AttitudeTable",
     "BodyVelocity",
     "Channel",
     "Clock",
     "ColumnKey",
-    "Constant",
     "Place",
     "Points",
+    "RecordConstant",
     "Unit",
     "unit_factor",
 ]

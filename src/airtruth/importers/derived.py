@@ -20,7 +20,7 @@ from airtruth.physics.atmosphere import (
     true_airspeed_m_s,
     true_airspeed_of_calibrated_m_s,
 )
-from airtruth.physics.reconstruction import COLUMNS, NEEDED, Priors, reconstruct
+from airtruth.physics.reconstruction import COLUMNS, NEEDED, ReconstructionPriors, reconstruct
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -108,7 +108,9 @@ def with_alpha(
     if missing:
         raise LogError(f"{where}: [reconstruct] alpha needs {', '.join(missing)}; map a column")
     q_std = stated.q_bias_deg_s * DEG
-    made = reconstruct(channels, dt_s, Priors(stated.az_bias_m_s2, q_std, stated.airspeed_error))
+    made = reconstruct(
+        channels, dt_s, ReconstructionPriors(stated.az_bias_m_s2, q_std, stated.airspeed_error)
+    )
     errors = dict(zip(COLUMNS, made.directions_rad, strict=True))
     return {**channels, "alpha_rad": made.alpha_rad, **errors}, made.drift_std_rad
 

@@ -80,7 +80,7 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class Entry:
+class DictionaryEntry:
     """A column of a source.
 
     Attributes
@@ -132,7 +132,7 @@ class Words:
     units: Mapping[str, Unit] = field(default_factory=dict)
     context: frozenset[str] = frozenset()
     refused: Mapping[str, str] = field(default_factory=dict)
-    columns: tuple[Entry, ...] = ()
+    columns: tuple[DictionaryEntry, ...] = ()
 
     def counts(self, names: Iterable[str]) -> bool:
         """Whether the source is recognised by the columns of a file."""
@@ -159,7 +159,7 @@ class Lexicon:
                 return Unit(found.name, sign)
         return None
 
-    def entry(self, name: str) -> tuple[Entry, Words] | None:
+    def entry(self, name: str) -> tuple[DictionaryEntry, Words] | None:
         """The first whole column that matches a name, and its source."""
         return next(((e, p) for p in self.parts for e in p.columns if e.matches(name)), None)
 
@@ -261,7 +261,7 @@ def _units(path: Path, raw: Mapping[str, Any]) -> Iterator[tuple[str, Unit]]:
         yield plain_unit(words), Unit(str(unit), int(sign))
 
 
-def _columns(path: Path, raw: Mapping[str, Any]) -> Iterator[Entry]:
+def _columns(path: Path, raw: Mapping[str, Any]) -> Iterator[DictionaryEntry]:
     listed = raw.get("column", [])
     if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
         raise ConfigurationError(f"{path}: column must be a list of tables, [[column]]")
@@ -292,7 +292,7 @@ def _columns(path: Path, raw: Mapping[str, Any]) -> Iterator[Entry]:
                 f'{path}: {where}: quaternion is "wxyz" or "xyzw", and match has four names'
             )
         try:
-            yield Entry(**{**one, "match": patterns, "offset": float(one.get("offset", 0.0))})
+            yield DictionaryEntry(**{**one, "match": patterns, "offset": float(one.get("offset", 0.0))})
         except (TypeError, ValueError):
             raise ConfigurationError(f"{path}: {where}: offset is not a number") from None
 
@@ -330,7 +330,7 @@ __all__ = [
     "SHORT",
     "TIME",
     "VELOCITY",
-    "Entry",
+    "DictionaryEntry",
     "Lexicon",
     "Unit",
     "Words",

@@ -14,9 +14,9 @@ from airtruth.checks.gate import inspect
 from airtruth.errors import AirtruthError
 from airtruth.importers.convert import convert
 from airtruth.importers.dictionary import Words, lexicon
-from airtruth.importers.guessing.assignment import CERTAIN, Decision, Search
-from airtruth.importers.guessing.candidates import Grid, candidates, rising, times_of
-from airtruth.importers.guessing.columns import Clock, Column, clocks_of, columns_of
+from airtruth.importers.guessing.assignment import CERTAIN, AssignmentSearch, Decision
+from airtruth.importers.guessing.candidates import CommonTimes, candidates, rising, times_of
+from airtruth.importers.guessing.columns import Column, GroupClock, clocks_of, columns_of
 from airtruth.importers.guessing.lateral import LATERAL_RELATIONS
 from airtruth.importers.guessing.proposal import Proposal, Writer
 from airtruth.importers.guessing.readings import Candidates, Reading
@@ -64,7 +64,7 @@ def guess_mapping(
     clocks = clocks_of(columns, known)
     grid = _grid(columns, clocks)
     found = candidates(columns, known, grid, clocks)
-    decisions = Search(found.readings, grid.dt_s).decisions()
+    decisions = AssignmentSearch(found.readings, grid.dt_s).decisions()
     times = Times(clocks, decisions, bool(source.clocks), run_column(source, clocks))
     beside = _lateral(found, decisions, grid.dt_s)
     proposal = Writer({**decisions, **beside}, found, times, grid).proposal()
@@ -100,7 +100,7 @@ def _lateral(found: Candidates, decisions: Mapping[str, Decision], dt_s: float) 
             elif (r.column, _EMPTY, r.channel) not in found.refused:
                 found.refused.append((r.column, _EMPTY, r.channel))
     given = {slot: one.reading for slot, one in decisions.items() if one.lead >= CERTAIN}
-    return Search(readings, dt_s, LATERAL_SLOTS, LATERAL_RELATIONS, given).decisions()
+    return AssignmentSearch(readings, dt_s, LATERAL_SLOTS, LATERAL_RELATIONS, given).decisions()
 
 
 def alike(source: Source) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ def _names(source: Source) -> Iterator[str]:
         yield from (label.strip("* ") for label in labels)
 
 
-def _grid(columns: Sequence[Column], clocks: Mapping[str, Clock]) -> Grid:
+def _grid(columns: Sequence[Column], clocks: Mapping[str, GroupClock]) -> CommonTimes:
     """Times common to the columns: those of the clocks' longest part, at the rate of the fastest within limits."""
     least, most, samples = _GRID
     times = {
@@ -138,7 +138,7 @@ def _grid(columns: Sequence[Column], clocks: Mapping[str, Clock]) -> Grid:
     usable = [t for t in times.values() if len(t) > 3 and 0.0 < np.ptp(t) < 1e7]
     if not usable:
         rows = max((len(c.values) for c in columns), default=4)
-        return Grid(np.arange(float(rows)), 0.0)
+        return CommonTimes(np.arange(float(rows)), 0.0)
     start, end = float(np.median([t.min() for t in usable])), float(np.median([t.max() for t in usable]))
     fastest = max(len(t) / float(np.ptp(t)) for t in usable)
     rate = float(np.clip(fastest, least, most))
@@ -146,7 +146,7 @@ def _grid(columns: Sequence[Column], clocks: Mapping[str, Clock]) -> Grid:
         middle = 0.5 * (start + end)
         start, end = middle - 0.5 * samples / rate, middle + 0.5 * samples / rate
     count = max(8, int((end - start) * rate))
-    return Grid(start + np.arange(count) / rate, 1.0 / rate)
+    return CommonTimes(start + np.arange(count) / rate, 1.0 / rate)
 
 
 def _source_table(section: SourceSection) -> Iterator[str]:

@@ -32,7 +32,7 @@ FREE: Final = "free response"
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateManoeuvre:
     """A part of a flight that may become a run; the columns of the table.
 
     Attributes
@@ -81,14 +81,14 @@ class ManoeuvreResult:
     threshold_rad : deviation of the elevator that counts as an input [rad].
     """
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateManoeuvre, ...]
     t_s: Array
     elevator_rad: Array
     q_rad_s: Array
     threshold_rad: float
 
     @property
-    def accepted(self) -> tuple[Candidate, ...]:
+    def accepted(self) -> tuple[CandidateManoeuvre, ...]:
         """Candidates that the import would take."""
         return tuple(c for c in self.candidates if c.accept == "yes")
 
@@ -96,7 +96,7 @@ class ManoeuvreResult:
         """The candidates as CSV, which `airtruth.importers.read_table` accepts after any edit."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        names = [f.name for f in fields(Candidate)]
+        names = [f.name for f in fields(CandidateManoeuvre)]
         writer.writerow(names)
         for one in self.candidates:
             cells = [getattr(one, name) for name in names]
@@ -119,7 +119,7 @@ class ManoeuvreResult:
         """One row per candidate, with the columns of the CSV table."""
         import pandas as pd
 
-        columns = [f.name for f in fields(Candidate)]
+        columns = [f.name for f in fields(CandidateManoeuvre)]
         return pd.DataFrame([asdict(c) for c in self.candidates], columns=columns)
 
     def to_dict(self) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class ManoeuvreResult:
 
     def _repr_html_(self) -> str:
         rows = [tuple(map(_cell, asdict(c).values())) for c in self.candidates]
-        columns = tuple(f.name for f in fields(Candidate))
+        columns = tuple(f.name for f in fields(CandidateManoeuvre))
         shown: Table = flat(self.summary().partition("\n")[0], columns, rows)
         return shown._repr_html_()
 
@@ -163,4 +163,4 @@ def _cell(value: str | float) -> Cell:
     return MISSING if math.isnan(value) else Number(value, digits=4)
 
 
-__all__ = ["FREE", "INPUT", "Candidate", "ManoeuvreResult"]
+__all__ = ["FREE", "INPUT", "CandidateManoeuvre", "ManoeuvreResult"]

@@ -21,8 +21,8 @@ from airtruth.checks.means import LIMITS, MEANS
 from airtruth.documents import read_plain
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.importers.free_response import free_spans
-from airtruth.importers.manoeuvre_result import FREE, INPUT, Candidate, ManoeuvreResult
-from airtruth.importers.mapping import Manoeuvre, Resample
+from airtruth.importers.manoeuvre_result import FREE, INPUT, CandidateManoeuvre, ManoeuvreResult
+from airtruth.importers.mapping import ManoeuvreSpan, Resample
 from airtruth.importers.series import Series
 from airtruth.importers.uniform import gaps, resampled
 from airtruth.numerics.prefilter import butterworth, edge_samples
@@ -134,7 +134,7 @@ def shortest_s(rate_hz: float) -> float:
     return LENGTHS * edge_samples(sos) / rate_hz
 
 
-def _without_gaps(candidate: Candidate, used: Mapping[str, Series]) -> Candidate:
+def _without_gaps(candidate: CandidateManoeuvre, used: Mapping[str, Series]) -> CandidateManoeuvre:
     """The candidate, not accepted where a recorder paused within it."""
     for name, one in used.items():
         for low, high in gaps(one):
@@ -214,7 +214,7 @@ def _candidate(
     background: float,
     t: Array,
     least_s: float,
-) -> Candidate:
+) -> CandidateManoeuvre:
     """Measures of one candidate: start, first and last sample of the input, and end."""
     low, first, last, high = at
     part = slice(low, high + 1)
@@ -253,7 +253,7 @@ def _candidate(
     if load > TURNING:
         reasons.append(f"mean load factor of {load:.2f}: a turn or a pull-up")
     energy = float((deviation[first : last + 1] ** 2).sum()) / RATE_HZ / DEG**2
-    return Candidate(
+    return CandidateManoeuvre(
         run_id=run_id,
         accept="no" if reasons else "yes",
         start_s=float(t[low]),
@@ -270,7 +270,7 @@ def _candidate(
     )
 
 
-def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
+def read_table(path: Path | str) -> tuple[ManoeuvreSpan, ...]:
     """Accepted manoeuvres of a table, as written by `ManoeuvreResult.table` or by hand.
 
     Columns start_s and end_s are needed; run_id is numbered where it is missing, and rows with accept = no are left out.
@@ -290,7 +290,7 @@ def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
     )
     if not rows or not {"start_s", "end_s"} <= set(rows[0]):
         raise ConfigurationError(f"{path}: needs the columns start_s and end_s and a row for each manoeuvre")
-    result: list[Manoeuvre] = []
+    result: list[ManoeuvreSpan] = []
     for line, row in enumerate(rows, start=2):
         accept = (row.get("accept") or "yes").strip().lower()
         if accept not in ("yes", "no"):
@@ -310,7 +310,7 @@ def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
         if not end > start:
             raise ConfigurationError(f"{path}, line {line}: end_s {end:g} is not after start_s {start:g}")
         name = (row.get("run_id") or "").strip() or f"m{line - 1:02d}"
-        result.append(Manoeuvre(run_id=name, start_s=start, end_s=end))
+        result.append(ManoeuvreSpan(run_id=name, start_s=start, end_s=end))
     if not result:
         raise ConfigurationError(f"{path}: accepts no manoeuvre; write yes under accept in a row")
     names = [one.run_id for one in result]

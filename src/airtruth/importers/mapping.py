@@ -12,13 +12,13 @@ from airtruth.documents import read_toml
 from airtruth.errors import ConfigurationError, choices
 from airtruth.importers.channel_table import (
     TIME_UNITS,
-    Attitude,
+    AttitudeTable,
     BodyVelocity,
     Channel,
     Clock,
     ColumnKey,
-    Constant,
     Place,
+    RecordConstant,
     Unit,
     unit_factor,
 )
@@ -150,7 +150,7 @@ class Reconstruct(Strict):
     airspeed_error: float = Field(default=0.02, gt=0.0)
 
 
-class Manoeuvre(Strict):
+class ManoeuvreSpan(Strict):
     """A part of the file that becomes a run; times on the file's own clock [s]."""
 
     run_id: str = Field(min_length=1)
@@ -175,11 +175,11 @@ class MappingFile(Strict):
     resample: Resample | None = None
     align: Align | None = None
     reconstruct: Reconstruct = Reconstruct()
-    attitude: Attitude | None = None
+    attitude: AttitudeTable | None = None
     body_velocity: BodyVelocity | None = None
     channels: dict[str, Channel]
-    constants: dict[str, Constant] = Field(default_factory=dict)
-    manoeuvre: tuple[Manoeuvre, ...] = ()
+    constants: dict[str, RecordConstant] = Field(default_factory=dict)
+    manoeuvre: tuple[ManoeuvreSpan, ...] = ()
 
     @field_validator("channels")
     @classmethod
@@ -197,7 +197,7 @@ class MappingFile(Strict):
 
     @field_validator("constants")
     @classmethod
-    def _known_constants(cls, value: dict[str, Constant]) -> dict[str, Constant]:
+    def _known_constants(cls, value: dict[str, RecordConstant]) -> dict[str, RecordConstant]:
         _units_of(value, CONSTANTS, "constant")
         return value
 
@@ -295,15 +295,15 @@ __all__ = [
     "MAPPED",
     "TIME_UNITS",
     "Align",
-    "Attitude",
+    "AttitudeTable",
     "BodyVelocity",
     "Channel",
     "Clock",
-    "Constant",
-    "Manoeuvre",
+    "ManoeuvreSpan",
     "MappingFile",
     "Place",
     "Reconstruct",
+    "RecordConstant",
     "Resample",
     "read_mapping",
     "unit_factor",

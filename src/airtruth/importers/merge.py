@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Piece:
+class MergedPiece:
     """A foreign file with its mapping, the alignment of its clock, and the parts of a clock that starts again."""
 
     source: Source
@@ -47,7 +47,7 @@ class Merged:
     reading : sentences on what was assumed or left out of the files.
     """
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[MergedPiece, ...]
     series: Mapping[str, Series]
     resample: Resample | None
     notes: tuple[str, ...] = field(default=())
@@ -68,7 +68,7 @@ def merge(parts: Sequence[tuple[Source, MappingFile]]) -> Merged:
     source, mapping = parts[0]
     series, read_notes, restarts = _read(source, mapping)
     reading = [*read_notes]
-    pieces, notes, reference = [Piece(source, mapping, parts=restarts)], [], dict(series)
+    pieces, notes, reference = [MergedPiece(source, mapping, parts=restarts)], [], dict(series)
     for other, own in parts[1:]:
         read, read_notes, others = _read(other, own)
         reading += read_notes
@@ -87,7 +87,7 @@ def merge(parts: Sequence[tuple[Source, MappingFile]]) -> Merged:
             alignment = Alignment(stated.offset_s, stated.std_s)
         else:
             alignment = aligned(name, reference, read, stated.channel if stated else None)
-        pieces.append(Piece(other, own, alignment))
+        pieces.append(MergedPiece(other, own, alignment))
         notes.append(alignment.sentence(other.path.name))
         for channel, one in read.items():
             if channel not in series:
@@ -114,4 +114,4 @@ def _read(source: Source, mapping: MappingFile) -> tuple[dict[str, Series], list
     return series, [*source.notes, *(f"{source.path.name}: {note}" for note in notes)], parts
 
 
-__all__ = ["Merged", "Piece", "merge"]
+__all__ = ["Merged", "MergedPiece", "merge"]

@@ -15,7 +15,7 @@ from airtruth.importers.channel_table import Points
 from airtruth.importers.mapping import (
     AIRSPEEDS,
     MAPPED,
-    Attitude,
+    AttitudeTable,
     BodyVelocity,
     Channel,
     Clock,
@@ -166,7 +166,9 @@ def _series(source: Source, mapping: MappingFile, name: str, one: Channel, clock
     return replace(times, values=_unwrapped(values) if name in _TURNING else values)
 
 
-def _attitude(source: Source, mapping: MappingFile, one: Attitude, clock: Series | None) -> dict[str, Series]:
+def _attitude(
+    source: Source, mapping: MappingFile, one: AttitudeTable, clock: Series | None
+) -> dict[str, Series]:
     """theta_rad, phi_rad and psi_rad of a quaternion; phi and psi do not jump by a turn."""
     places = [Place(column=key, variable=one.variable) for key in one.quaternion]
     times, read = _read(source, mapping, places, "attitude", one.clock, clock)

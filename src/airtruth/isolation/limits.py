@@ -20,7 +20,7 @@ two copies exist for a moment)."""
 
 
 @dataclass(frozen=True)
-class Limits:
+class ProcessLimits:
     """Limits of one call.
 
     Attributes
@@ -38,15 +38,15 @@ class Limits:
         return asdict(self)
 
 
-def limits_of(file_bytes: int) -> Limits:
+def limits_of(file_bytes: int) -> ProcessLimits:
     """Return the limits for reading a file of a size [byte]."""
-    return Limits(
+    return ProcessLimits(
         seconds=LEAST_SECONDS + file_bytes / BYTES_PER_SECOND,
         memory_bytes=LEAST_MEMORY_BYTES + round(MEMORY_PER_BYTE * file_bytes),
     )
 
 
-def impose(limits: Limits) -> None:
+def impose(limits: ProcessLimits) -> None:
     """Limit this process; the system ends it when the time is over, whatever it does.
 
     Windows has neither limit and macOS does not enforce that of memory: there the caller's own clock is the only limit.
@@ -87,4 +87,4 @@ def _lower(resource: Any, kind: int, value: int) -> bool:
     return all(value < limit for limit in stated)
 
 
-__all__ = ["Limits", "impose", "impose_cpu_time", "impose_memory", "limits_of"]
+__all__ = ["ProcessLimits", "impose", "impose_cpu_time", "impose_memory", "limits_of"]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from airtruth import errors
 from airtruth.errors import AirtruthError
-from airtruth.isolation.limits import Limits
+from airtruth.isolation.limits import ProcessLimits
 
 LENGTH: Final = struct.Struct("<Q")
 """Length of the JSON before it [byte]."""
@@ -29,7 +29,7 @@ class Task:
 
     function: str
     arguments: Mapping[str, Any]
-    limits: Limits
+    limits: ProcessLimits
     modules: tuple[str, ...] = ()
 
     def encoded(self) -> bytes:
@@ -47,7 +47,7 @@ class Task:
     def decoded(cls, text: bytes) -> Task:
         """Inverse of `encoded`."""
         raw = json.loads(text)
-        return cls(raw["function"], raw["arguments"], Limits(**raw["limits"]), tuple(raw["modules"]))
+        return cls(raw["function"], raw["arguments"], ProcessLimits(**raw["limits"]), tuple(raw["modules"]))
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ EXTRA: Final = "extra"
 
 
 @dataclass(frozen=True)
-class Finding:
+class FileFinding:
     """A file that is not as recorded.
 
     Attributes
@@ -65,7 +65,7 @@ class Verification:
 
     folder: Path
     checked: int
-    findings: tuple[Finding, ...]
+    findings: tuple[FileFinding, ...]
 
     @property
     def intact(self) -> bool:
@@ -113,7 +113,7 @@ def verify(folder: Path | str) -> Verification:
             f"{folder}: holds neither {MANIFEST} nor {LEDGER}, with which its files could be compared; "
             "give a folder into which a command wrote"
         )
-    findings: list[Finding] = []
+    findings: list[FileFinding] = []
     recorded: dict[str, str] = {}
     known = {*ledgers, LOCK}
     for at in campaigns:
@@ -125,14 +125,14 @@ def verify(folder: Path | str) -> Verification:
         try:
             entries = ledger.read(files[name].parent)
         except StoreError as error:
-            findings.append(Finding(name, DAMAGED, str(error).partition(": ")[2]))
+            findings.append(FileFinding(name, DAMAGED, str(error).partition(": ")[2]))
             continue
         parent = PurePosixPath(name).parent
         recorded |= {(parent / file).as_posix(): entry.sha256 for file, entry in entries.items()}
     findings += _compared(folder, recorded)
     known |= recorded.keys()
     findings += [
-        Finding(name, EXTRA, "no manifest or ledger lists it") for name in sorted(files.keys() - known)
+        FileFinding(name, EXTRA, "no manifest or ledger lists it") for name in sorted(files.keys() - known)
     ]
     return Verification(folder, len(recorded), tuple(sorted(findings, key=lambda f: f.file)))
 
@@ -156,12 +156,12 @@ def _own_files(names: Iterable[str], at: PurePosixPath, *, complete: bool) -> se
     }
 
 
-def _of_manifest(folder: Path) -> tuple[dict[str, str], list[Finding]]:
+def _of_manifest(folder: Path) -> tuple[dict[str, str], list[FileFinding]]:
     """Digests by file name, and what is wrong with the manifest itself."""
     if not (folder / MANIFEST).exists():
-        return {}, [Finding(MANIFEST, MISSING, "the same fly command writes it again")]
+        return {}, [FileFinding(MANIFEST, MISSING, "the same fly command writes it again")]
     scan = manifest.scan(folder / MANIFEST)
-    faults = [Finding(MANIFEST, DAMAGED, f"line {number}") for number in scan.damaged]
+    faults = [FileFinding(MANIFEST, DAMAGED, f"line {number}") for number in scan.damaged]
     digests: dict[str, str] = {}
     for record in scan.records:
         files: Any = record.get("files", {})
@@ -171,18 +171,20 @@ def _of_manifest(folder: Path) -> tuple[dict[str, str], list[Finding]]:
             digests[f"truth-parts/{chunk_file(number)}"] = str(record["truth"])
     if not scan.closed and not faults:
         faults = [
-            Finding(MANIFEST, DAMAGED, "is not that of a complete campaign; the same fly command continues")
+            FileFinding(
+                MANIFEST, DAMAGED, "is not that of a complete campaign; the same fly command continues"
+            )
         ]
     return digests, faults
 
 
-def _compared(folder: Path, recorded: dict[str, str]) -> Iterator[Finding]:
+def _compared(folder: Path, recorded: dict[str, str]) -> Iterator[FileFinding]:
     present = sha256_of_each([folder / name for name in recorded])
     for (name, digest), here in zip(recorded.items(), present, strict=True):
         if here is None:
-            yield Finding(name, MISSING, "is listed and does not exist")
+            yield FileFinding(name, MISSING, "is listed and does not exist")
         elif here != digest:
-            yield Finding(name, DAMAGED, "its SHA-256 is not the recorded one")
+            yield FileFinding(name, DAMAGED, "its SHA-256 is not the recorded one")
 
 
-__all__ = ["DAMAGED", "EXTRA", "MISSING", "Finding", "Verification", "verify"]
+__all__ = ["DAMAGED", "EXTRA", "MISSING", "FileFinding", "Verification", "verify"]

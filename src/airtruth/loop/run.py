@@ -22,7 +22,7 @@ from airtruth.loop.same_inputs import simulated_logs
 from airtruth.physics.motion import FOLDERS
 from airtruth.tracing import TraceOptions, TraceResult
 from airtruth.tracing.compensate import Compensation, compensated_log, compensation_of, updated_constants
-from airtruth.tracing.motions import Part, parts_of
+from airtruth.tracing.motions import MotionTrace, parts_of
 from airtruth.tracing.run import trace
 from airtruth.tracing.selection.budget import Advance
 
@@ -74,7 +74,7 @@ def close_loop(
     return replace(first, others=tuple(others))
 
 
-def _methods_of(methods: Sequence[str], part: Part) -> tuple[str, ...]:
+def _methods_of(methods: Sequence[str], part: MotionTrace) -> tuple[str, ...]:
     """The estimators that the motion has, where the records choose the motions; all where one is named."""
     every = (methods,) if isinstance(methods, str) else tuple(methods)
     known = OF_MOTION[part.motion.name]
@@ -86,7 +86,7 @@ def _methods_of(methods: Sequence[str], part: Part) -> tuple[str, ...]:
 def _closed(
     logs: Logs,
     declared: Aircraft,
-    part: Part,
+    part: MotionTrace,
     out: Path | None,
     methods: Sequence[str],
     options: Options | None,

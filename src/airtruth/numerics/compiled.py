@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection
 from typing import Any, Final, TypeVar
 
 from numba import njit
+from numba.core.caching import IndexDataCacheFile
 from numba.extending import overload, register_jitable
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -67,5 +68,22 @@ def allocating(function: F) -> F:
     compiled: F = njit(error_model="numpy", **_WITHOUT_ENTRY)(function)
     return compiled
 
+
+def _tolerant(load: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Take an index of the cache that names a type which no longer exists for that of another version: numba compiles again."""
+
+    def load_or_nothing(index: Any) -> Any:
+        try:
+            return load(index)
+        except (
+            AttributeError,
+            ImportError,
+        ):  # numba unpickles the types before it compares the versions of the source
+            return {}
+
+    return load_or_nothing
+
+
+IndexDataCacheFile._load_index = _tolerant(IndexDataCacheFile._load_index)  # type: ignore[method-assign]
 
 __all__ = ["allocating", "by_types", "inner", "shared"]

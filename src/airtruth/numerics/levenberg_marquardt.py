@@ -26,7 +26,7 @@ from typing import Final, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.numerics.levenberg_marquardt_options import Options
+from airtruth.numerics.levenberg_marquardt_options import SolverOptions
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -35,7 +35,7 @@ _TINY: Final = 1e-300
 """Least promised decrease by which a decrease is divided [unit of the cost]; prevents a division by zero."""
 
 
-class Status(IntEnum):
+class SolverStatus(IntEnum):
     """Why a search ended."""
 
     RUNNING = 0
@@ -105,12 +105,12 @@ class Solution(Generic[E]):
 
     x: Array
     at: tuple[E | None, ...]
-    status: tuple[Status, ...]
+    status: tuple[SolverStatus, ...]
     iterations: tuple[int, ...]
 
 
 @dataclass
-class _Search(Generic[E]):
+class _Iteration(Generic[E]):
     """State of one search."""
 
     number: int
@@ -118,7 +118,7 @@ class _Search(Generic[E]):
     at: E | None
     damping: float
     fresh: bool = True
-    status: Status = Status.RUNNING
+    status: SolverStatus = SolverStatus.RUNNING
     iterations: int = 0
 
 
@@ -126,7 +126,7 @@ class _Search(Generic[E]):
 class _Trial(Generic[E]):
     """A proposed step of one search: where it leads, and what it promised."""
 
-    search: _Search[E]
+    search: _Iteration[E]
     promised: float
     x: Array
     at: E | None
@@ -135,7 +135,7 @@ class _Trial(Generic[E]):
 def minimise(
     problems: Problems[E],
     start: Array,
-    options: Options,
+    options: SolverOptions,
     rival: float = np.inf,
     near: Sequence[E] | None = None,
     at_near: bool = False,
@@ -154,19 +154,19 @@ def minimise(
     index = np.arange(len(start))
     first = problems.evaluate(start, index, near)
     fresh = near is None or at_near
-    searches = [_Search(i, start[i], at, options.damping.initial, fresh) for i, at in enumerate(first)]
+    searches = [_Iteration(i, start[i], at, options.damping.initial, fresh) for i, at in enumerate(first)]
     for search in searches:
         if search.at is None:
-            search.status = Status.FAILED
+            search.status = SolverStatus.FAILED
     for _ in range(options.iterations):
-        running = [s for s in searches if s.status is Status.RUNNING]
+        running = [s for s in searches if s.status is SolverStatus.RUNNING]
         if not running:
             break
         _iterate(problems, running, options, rival)
     for search in searches:
-        if search.status is Status.RUNNING:
-            search.status = Status.ITERATIONS
-    renewed = [s for s in searches if options.renewed_outrun or s.status is not Status.OUTRUN]
+        if search.status is SolverStatus.RUNNING:
+            search.status = SolverStatus.ITERATIONS
+    renewed = [s for s in searches if options.renewed_outrun or s.status is not SolverStatus.OUTRUN]
     _renew(problems, [s for s in renewed if options.renewed_end and not s.fresh])
     return Solution(
         np.array([s.x for s in searches]),
@@ -176,7 +176,9 @@ def minimise(
     )
 
 
-def _iterate(problems: Problems[E], searches: Sequence[_Search[E]], options: Options, rival: float) -> None:
+def _iterate(
+    problems: Problems[E], searches: Sequence[_Iteration[E]], options: SolverOptions, rival: float
+) -> None:
     """One iteration of each search."""
     for search in searches:
         search.iterations += 1
@@ -188,8 +190,8 @@ def _iterate(problems: Problems[E], searches: Sequence[_Search[E]], options: Opt
         for trial in trials:
             if trial.promised < stopping.promised and trial.search.fresh:
                 sure = _promises_less(problems, trial.search, options, stopping.promised_confirm)
-                trial.search.status = Status.CONVERGED if sure else Status.SHORT
-        trials = [t for t in trials if t.search.status is Status.RUNNING]
+                trial.search.status = SolverStatus.CONVERGED if sure else SolverStatus.SHORT
+        trials = [t for t in trials if t.search.status is SolverStatus.RUNNING]
     _evaluate(problems, trials, options.reuse)
     for trial in trials:
         _follow_chords(problems, trial, options.chords)
@@ -198,16 +200,18 @@ def _iterate(problems: Problems[E], searches: Sequence[_Search[E]], options: Opt
         decrease = _accept_or_reject(problems, trial, options, rival)
         search = trial.search
         limit = max(options.stale, options.creeping * trial.promised)
-        if search.status is Status.RUNNING and not search.fresh and decrease < limit:
+        if search.status is SolverStatus.RUNNING and not search.fresh and decrease < limit:
             stale.append(search)
     for search in _renew(problems, stale):
-        search.status = Status.SHORT
+        search.status = SolverStatus.SHORT
     for trial in trials:
-        if trial.search.status is Status.RUNNING and trial.search.damping > options.damping.most:
-            trial.search.status = Status.STALLED
+        if trial.search.status is SolverStatus.RUNNING and trial.search.damping > options.damping.most:
+            trial.search.status = SolverStatus.STALLED
 
 
-def _end_undamped(problems: Problems[E], searches: Sequence[_Search[E]], limit: float) -> list[_Search[E]]:
+def _end_undamped(
+    problems: Problems[E], searches: Sequence[_Iteration[E]], limit: float
+) -> list[_Iteration[E]]:
     """Take the last, undamped step where it promises no more than a limit; the searches that go on."""
     steps, promised, x, index = _steps(problems, searches, np.zeros(len(searches)))
     ended = np.isfinite(promised) & np.less_equal(promised, limit)
@@ -215,13 +219,13 @@ def _end_undamped(problems: Problems[E], searches: Sequence[_Search[E]], limit: 
     going = []
     for search, end, moved in zip(searches, ended, x, strict=True):
         if end:
-            search.x, search.status = moved, Status.CONVERGED
+            search.x, search.status = moved, SolverStatus.CONVERGED
         else:
             going.append(search)
     return going
 
 
-def _propose(problems: Problems[E], searches: Sequence[_Search[E]]) -> list[_Trial[E]]:
+def _propose(problems: Problems[E], searches: Sequence[_Iteration[E]]) -> list[_Trial[E]]:
     """The damped step of each search."""
     if not searches:
         return []
@@ -233,12 +237,12 @@ def _propose(problems: Problems[E], searches: Sequence[_Search[E]]) -> list[_Tri
         if good:
             trials.append(_Trial(search, float(promise), there, None))
         else:
-            search.status = Status.SINGULAR
+            search.status = SolverStatus.SINGULAR
     return trials
 
 
 def _steps(
-    problems: Problems[E], searches: Sequence[_Search[E]], damping: Array
+    problems: Problems[E], searches: Sequence[_Iteration[E]], damping: Array
 ) -> tuple[Array, Array, Array, Ints]:
     at = [s.at for s in searches if s.at is not None]
     x, index = np.array([s.x for s in searches]), np.array([s.number for s in searches], dtype=np.int64)
@@ -264,7 +268,7 @@ def _follow_chords(problems: Problems[E], trial: _Trial[E], most: int) -> None:
     for _ in range(most):
         if trial.at is None or search.at is None or search.at.cost - trial.at.cost > 0.5 * trial.promised:
             return
-        beyond = _Search(search.number, trial.x, trial.at, search.damping)
+        beyond = _Iteration(search.number, trial.x, trial.at, search.damping)
         step, _, x, index = _steps(problems, [beyond], np.array([search.damping]))
         further = problems.move(x, step, index)
         again = problems.evaluate(further, index, [search.at])[0]
@@ -273,7 +277,7 @@ def _follow_chords(problems: Problems[E], trial: _Trial[E], most: int) -> None:
         trial.x, trial.at = further[0], again
 
 
-def _accept_or_reject(problems: Problems[E], trial: _Trial[E], options: Options, rival: float) -> float:
+def _accept_or_reject(problems: Problems[E], trial: _Trial[E], options: SolverOptions, rival: float) -> float:
     """Take a trial point or raise the damping; end the search where a rule says so. The decrease of the cost."""
     search, stopping = trial.search, options.stopping
     decrease = -np.inf
@@ -286,9 +290,9 @@ def _accept_or_reject(problems: Problems[E], trial: _Trial[E], options: Options,
         margin = min(options.outrun, options.outrun_renewed) if search.fresh else options.outrun
         small = stopping.decrease is not None and decrease < stopping.decrease and search.fresh
         if behind > margin and 4.0 * decrease < behind:
-            search.status = Status.OUTRUN
+            search.status = SolverStatus.OUTRUN
         elif small and _promises_less(problems, search, options, stopping.decrease_confirm):
-            search.status = Status.CONVERGED
+            search.status = SolverStatus.CONVERGED
         elif options.reuse:
             search.fresh = False
     elif (
@@ -296,13 +300,15 @@ def _accept_or_reject(problems: Problems[E], trial: _Trial[E], options: Options,
         and search.fresh
         and _promises_less(problems, search, options, stopping.rejected)
     ):
-        search.status = Status.CONVERGED
+        search.status = SolverStatus.CONVERGED
     else:
         search.damping = options.damping.after(search.damping, None)
     return float(decrease)
 
 
-def _promises_less(problems: Problems[E], search: _Search[E], options: Options, limit: float | None) -> bool:
+def _promises_less(
+    problems: Problems[E], search: _Iteration[E], options: SolverOptions, limit: float | None
+) -> bool:
     """Whether a step at the least damping promises less than a limit; None is no limit."""
     if limit is None:
         return True
@@ -310,7 +316,7 @@ def _promises_less(problems: Problems[E], search: _Search[E], options: Options, 
     return bool(promised[0] < limit)
 
 
-def _renew(problems: Problems[E], searches: Sequence[_Search[E]]) -> list[_Search[E]]:
+def _renew(problems: Problems[E], searches: Sequence[_Iteration[E]]) -> list[_Iteration[E]]:
     """Make derivatives at the present points; the searches for which that fails."""
     if not searches:
         return []
@@ -326,4 +332,4 @@ def _renew(problems: Problems[E], searches: Sequence[_Search[E]]) -> list[_Searc
     return failed
 
 
-__all__ = ["Evaluation", "Problems", "Solution", "Status", "minimise"]
+__all__ = ["Evaluation", "Problems", "Solution", "SolverStatus", "minimise"]

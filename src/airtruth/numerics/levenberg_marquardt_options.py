@@ -56,7 +56,7 @@ class Stopping:
     ----------
     undamped : promised by an undamped step, which is then taken: converged.
     promised : promised by the damped step. Converged if an undamped step promises less than ``promised_confirm``,
-        else `airtruth.numerics.levenberg_marquardt.Status.SHORT`.
+        else `airtruth.numerics.levenberg_marquardt.SolverStatus.SHORT`.
     decrease : achieved by an accepted step. Converged if an undamped step promises less than ``decrease_confirm``,
         else the search continues.
     rejected : promised by an undamped step after a rejected one: converged.
@@ -71,7 +71,7 @@ class Stopping:
 
 
 @dataclass(frozen=True)
-class Options:
+class SolverOptions:
     """How to search.
 
     Attributes
@@ -104,4 +104,4 @@ class Options:
     outrun_renewed: float = np.inf
 
 
-__all__ = ["Damping", "Options", "Stopping"]
+__all__ = ["Damping", "SolverOptions", "Stopping"]

@@ -50,6 +50,7 @@ class Motion:
     forces, incidence : its coefficients together, and its flow angle, in words.
     known_signals : known inputs over which an increment of a coefficient may depend beside the signals.
     unscored : derivatives that a record does not determine; scores leave them out.
+    linear : its linear model, in words.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Motion:
     incidence: str
     known_signals: tuple[Signal, ...] = ()
     unscored: tuple[str, ...] = ()
+    linear: str = ""
 
     def __reduce__(self) -> tuple[Callable[[str], Motion], tuple[str]]:
         """Pickle the name: a motion is the same object in every process."""
@@ -277,6 +279,7 @@ LONGITUDINAL: Final = Motion(
     required=("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad"),
     forces="lift or moment",
     incidence="angle of attack",
+    linear="short-period",
 )
 """The short-period motion in the pitch plane."""
 
@@ -335,11 +338,14 @@ LATERAL: Final = Motion(
     incidence="angle of sideslip",
     known_signals=(Signal("alpha", "alpha", "alpha_rad"),),
     unscored=("CYp", "CYda", "Cnda"),
+    linear="lateral-directional",
 )
 """The lateral-directional motion; a log holds beta_rad, or phi_rad or psi_rad from which it is reconstructed. Of the three
 unscored derivatives a record of 10 s leaves a standard deviation of 20 to 100 % at the Cramer-Rao bound (docs/lateral.md)."""
 
-MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LONGITUDINAL, LATERAL)})
+_MOTIONS: Final = {m.name: m for m in (LONGITUDINAL, LATERAL)}
+"""The same, which a test may extend."""
+MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType(_MOTIONS)
 """Name -> motion, in the order of answers."""
 
 

@@ -49,7 +49,7 @@ def is_reconstructed(channels: Collection[str]) -> bool:
 
 
 @dataclass(frozen=True)
-class Priors:
+class ReconstructionPriors:
     """Standard deviations of constant errors: az [m/s2], q [rad/s], relative error of V [-]."""
 
     az_m_s2: float
@@ -77,7 +77,7 @@ class Reconstruction:
         return float(np.sqrt((centred**2).sum(axis=0)).max())
 
 
-def reconstruct(channels: Mapping[str, Array], dt_s: float, priors: Priors) -> Reconstruction:
+def reconstruct(channels: Mapping[str, Array], dt_s: float, priors: ReconstructionPriors) -> Reconstruction:
     """Angle of attack of one run.
 
     Parameters
@@ -166,4 +166,12 @@ def _integral(x: Array, dt_s: float) -> Array:
     return np.asarray(rule(x, dx=dt_s, initial=0.0))
 
 
-__all__ = ["COLUMNS", "ERRORS", "NEEDED", "Priors", "Reconstruction", "is_reconstructed", "reconstruct"]
+__all__ = [
+    "COLUMNS",
+    "ERRORS",
+    "NEEDED",
+    "Reconstruction",
+    "ReconstructionPriors",
+    "is_reconstructed",
+    "reconstruct",
+]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.motion_parts import Control
 from airtruth.physics.sensor_errors import Kind
 
 Array = NDArray[np.float64]
@@ -67,8 +68,6 @@ OUTPUTS: Final = frozenset(channel for m in MOTIONS.values() for channel in m.ou
 """Channels of a `ReadingTerm`: the outputs of every motion."""
 ELEVATOR: Final = LONGITUDINAL.controls[0].name
 """Control of a `SurfaceTerm` that names none."""
-_CHANNELS: Final = {c.name: c.channel for m in MOTIONS.values() for c in m.controls}
-"""Control -> column of its measured deflection."""
 _ACROSS: Final = {"arm_right": "p_rad_s"}
 """Kind of error of a position -> rate of rotation that it needs, where the channel itself does not imply it."""
 SHAPES: Final = ("linear", "quadratic", "above", "below")
@@ -367,18 +366,18 @@ class Change:
         """The surface terms of one control."""
         return tuple(term for term in self.surface if term.control == control)
 
-    def surface_path(self, control: str = ELEVATOR) -> tuple[SurfaceTerm, ...]:
+    def surface_path(self, control: Control = LONGITUDINAL.controls[0]) -> tuple[SurfaceTerm, ...]:
         """Elements between the reading of a control and the air: a late reading is a negative delay before `surface`.
 
         Examples
         --------
         >>> late = Change(sensors=(SensorTerm("rudder_rad", "delay", 0.02),))
-        >>> late.surface_path("rudder"), late.surface_path()
+        >>> late.surface_path(MOTIONS["lateral"].controls[1]), late.surface_path()
         ((SurfaceTerm(kind='delay', value=-0.02, control='rudder'),), ())
         """
-        own = self.of_surface(control)
-        late = sum(t.value for t in self.sensors if (t.channel, t.kind) == (_CHANNELS[control], "delay"))
-        return (SurfaceTerm("delay", -late, control), *own) if late != 0.0 else own
+        own = self.of_surface(control.name)
+        late = sum(t.value for t in self.sensors if (t.channel, t.kind) == (control.channel, "delay"))
+        return (SurfaceTerm("delay", -late, control.name), *own) if late != 0.0 else own
 
     def names(self) -> frozenset[str]:
         """Every name of its terms that a motion has to have; states of its own are none."""

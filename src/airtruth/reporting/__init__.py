@@ -1,15 +1,15 @@
 """Reports of results, and the paper's tables and figures from flown and identified campaigns."""
 
-from airtruth.reporting.campaign import Campaign, MethodEstimates, read_campaign
-from airtruth.reporting.paper.tables import TABLES, Entry, PaperTable, TableSpec, evaluate
+from airtruth.reporting.campaign import FlownCampaign, MethodEstimates, read_campaign
+from airtruth.reporting.paper.tables import TABLES, PaperEntry, PaperTable, TableSpec, evaluate
 from airtruth.reporting.reporter import report
 from airtruth.reporting.write import WrittenTables, write_tables
 
 __all__ = [
     "TABLES",
-    "Campaign",
-    "Entry",
+    "FlownCampaign",
     "MethodEstimates",
+    "PaperEntry",
     "PaperTable",
     "TableSpec",
     "WrittenTables",

@@ -75,7 +75,7 @@ class MethodEstimates:
 
 
 @dataclass(frozen=True)
-class Campaign:
+class FlownCampaign:
     """A flown and identified campaign, of one motion.
 
     Attributes
@@ -110,7 +110,7 @@ class Campaign:
         """Number of planned runs."""
         return len(self.run_ids)
 
-    def parts(self) -> Iterator[Campaign]:
+    def parts(self) -> Iterator[FlownCampaign]:
         """Yield the campaign as its only part."""
         yield self
 
@@ -131,11 +131,11 @@ class Campaign:
 
 
 class Parted(Protocol):
-    """A campaign whose runs come in parts: a `Campaign` in memory, or one that is read part by part.
+    """A campaign whose runs come in parts: a `FlownCampaign` in memory, or one that is read part by part.
 
     Attributes
     ----------
-    folder, name, title, gust : as in `Campaign`.
+    folder, name, title, gust : as in `FlownCampaign`.
     methods : methods with estimates.
     runs : number of planned runs.
     motion : whose parameters are estimated.
@@ -155,7 +155,7 @@ class Parted(Protocol):
     def runs(self) -> int: ...
     @property
     def motion(self) -> Motion: ...
-    def parts(self) -> Iterable[Campaign]:
+    def parts(self) -> Iterable[FlownCampaign]:
         """Return the same parts at each call, each run in one of them, in the order of the truth."""
         ...
 
@@ -180,7 +180,7 @@ def motions_of(folder: Path) -> tuple[Motion, ...]:
     return found or (LONGITUDINAL,)
 
 
-def read_campaign(folder: Path, motion: Motion = LONGITUDINAL) -> Campaign:
+def read_campaign(folder: Path, motion: Motion = LONGITUDINAL) -> FlownCampaign:
     """Read the truth and the estimates of a motion from a campaign folder.
 
     Raises
@@ -203,7 +203,7 @@ def read_campaign(folder: Path, motion: Motion = LONGITUDINAL) -> Campaign:
             f"{truth_path}: holds {len(run_ids)} of the {described.runs} runs that {DESCRIPTION} plans; "
             f"{fly} flies the others"
         )
-    return Campaign(
+    return FlownCampaign(
         folder=folder,
         name=described.name,
         title=described.title,

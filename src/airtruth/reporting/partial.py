@@ -89,10 +89,10 @@ def method_statistics(parts: Parts) -> dict[str, MethodStatistics]:
     ----------
     parts : the runs, each in one part.
     """
-    sums: dict[str, _Sums] = {}
+    sums: dict[str, _PartialSums] = {}
     for part in parts():
         for method, sample in part.items():
-            sums.setdefault(method, _Sums(sample.motion)).add(sample)
+            sums.setdefault(method, _PartialSums(sample.motion)).add(sample)
     powers = {method: _Powers(own) for method, own in sums.items()}
     products = np.zeros((len(sums), len(sums)))
     for part in parts():
@@ -111,7 +111,7 @@ def method_statistics(parts: Parts) -> dict[str, MethodStatistics]:
     }
 
 
-class _Sums:
+class _PartialSums:
     """First pass: numbers of runs and sums."""
 
     def __init__(self, motion: Motion) -> None:
@@ -160,7 +160,7 @@ class _Sums:
 class _Powers:
     """Second pass: sums of powers of the deviations from the means."""
 
-    def __init__(self, sums: _Sums) -> None:
+    def __init__(self, sums: _PartialSums) -> None:
         self._used = sums.used
         self._values, self._errors = sums.values / sums.n, sums.errors / sums.n
         self._truth, self._squares = sums.truth / sums.n, sums.squares / sums.n
@@ -193,7 +193,11 @@ def _sum(x: Array, entering: NDArray[np.bool_]) -> Array:
 
 
 def _statistics(
-    sums: _Sums, powers: _Powers, robust: tuple[Array, Array], own: float, products: Mapping[str, float]
+    sums: _PartialSums,
+    powers: _Powers,
+    robust: tuple[Array, Array],
+    own: float,
+    products: Mapping[str, float],
 ) -> MethodStatistics:
     coverage = statistics.hit_rate_of(sums.n, sums.hits)
     bias, truth = sums.errors / sums.n, sums.truth / sums.n
@@ -220,7 +224,7 @@ def _statistics(
     )
 
 
-def _robust(parts: Parts, sums: Mapping[str, _Sums]) -> tuple[Array, Array]:
+def _robust(parts: Parts, sums: Mapping[str, _PartialSums]) -> tuple[Array, Array]:
     """Median and scaled median absolute deviation of each column over its finite rows, (methods, estimated) each."""
     methods = list(sums)
 

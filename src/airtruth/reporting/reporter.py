@@ -14,7 +14,7 @@ from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.logs.remote import location
 from airtruth.logs.sources import Logs
 from airtruth.physics.motion import FOLDERS, LONGITUDINAL, motion_of
-from airtruth.reporting.campaign import TRUTH, Campaign, Parted
+from airtruth.reporting.campaign import TRUTH, FlownCampaign, Parted
 from airtruth.reporting.columns import columns_of
 from airtruth.reporting.stored_campaign import open_campaigns
 from airtruth.result import Result
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from airtruth.aircraft import Aircraft
     from airtruth.reporting.pages.page import Report
 
-Source = Path | str | Campaign | Result
+Source = Path | str | FlownCampaign | Result
 """A folder of a trace, a loop or a campaign, a file of estimates, or a result in memory."""
 
 
@@ -75,7 +75,7 @@ def report(
 
 
 def _report(source: Source, logs: Logs | None, aircraft: Aircraft | None) -> Report:
-    if isinstance(source, Campaign):
+    if isinstance(source, FlownCampaign):
         return _of_campaign((source,), logs, aircraft)
     if isinstance(source, Path | str):
         return _of_path(location(source), logs, aircraft)

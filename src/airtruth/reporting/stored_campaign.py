@@ -18,7 +18,7 @@ from airtruth.reporting.campaign import (
     FAILED,
     FLOWN,
     TRUTH,
-    Campaign,
+    FlownCampaign,
     Parted,
     estimate_kinds,
     estimates_of,
@@ -51,7 +51,7 @@ class StoredCampaign:
 
     Attributes
     ----------
-    folder, name, title, gust, motion : as in `airtruth.reporting.campaign.Campaign`.
+    folder, name, title, gust, motion : as in `airtruth.reporting.campaign.FlownCampaign`.
     methods : methods of each run.
     runs : number of planned runs.
     """
@@ -64,7 +64,7 @@ class StoredCampaign:
     runs: int
     motion: Motion = LONGITUDINAL
 
-    def parts(self) -> Iterator[Campaign]:
+    def parts(self) -> Iterator[FlownCampaign]:
         """Read the runs, `RUNS_PER_PART` at a time.
 
         Raises
@@ -83,7 +83,7 @@ class StoredCampaign:
             )
             own = rows.take(int(flown.sum()) * len(self.methods))
             at = np.flatnonzero(flown)
-            yield Campaign(
+            yield FlownCampaign(
                 folder=self.folder,
                 name=self.name,
                 title=self.title,

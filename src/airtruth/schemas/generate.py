@@ -23,16 +23,16 @@ from airtruth.importers.mapping import (
     Channel,
     Clock,
     MappingFile,
+    RecordConstant,
     TimeSection,
 )
-from airtruth.importers.mapping import Constant as RecordConstant
 from airtruth.physics.gust_figures import FIGURES, LEVELS
 from airtruth.physics.sensor_errors import KINDS as ERROR_KINDS
 from airtruth.quantity import FromTable
 from airtruth.simulation.campaign.effect_table import EffectTable
 from airtruth.simulation.campaign.file import NO_GUST, GustTable, SensorTable
 from airtruth.simulation.campaign.manoeuvre_table import InputTable, ManoeuvreTable
-from airtruth.simulation.campaign.tables import Table, distribution
+from airtruth.simulation.campaign.tables import UnitTable, distribution
 from airtruth.simulation.manoeuvres import CONTROLS, KINDS
 from airtruth.units import UNITS
 
@@ -82,7 +82,7 @@ class TomlSchema(GenerateJsonSchema):
         for (owner, name), names in NAMES.items():
             if owner is model:
                 described["properties"][name]["enum"] = list(names)
-        if issubclass(model, Table):
+        if issubclass(model, UnitTable):
             _with_units(described, model.dimensions)
         _complete(model, described)
         return described

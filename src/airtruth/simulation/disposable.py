@@ -18,7 +18,7 @@ import numpy as np
 
 from airtruth.errors import AircraftError, StoreError, reason
 from airtruth.isolation.client import call
-from airtruth.isolation.limits import Limits
+from airtruth.isolation.limits import ProcessLimits
 from airtruth.isolation.protocol import IsolatedError, Reply, Task
 
 P = ParamSpec("P")
@@ -42,10 +42,10 @@ _kept: Final[list[BaseException]] = []
 """Exceptions of failed executives, kept because the destructor of such an executive aborts the process."""
 
 
-def limits_of(steps: int) -> Limits:
+def limits_of(steps: int) -> ProcessLimits:
     """Limits of a trim and of flights of a number of simulation steps in all."""
     more = _STEP_S * steps
-    return Limits(SECONDS + more, MEMORY_BYTES + _STEP_BYTES * steps, COMPUTING_S + more)
+    return ProcessLimits(SECONDS + more, MEMORY_BYTES + _STEP_BYTES * steps, COMPUTING_S + more)
 
 
 def isolated(work: str, function: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:

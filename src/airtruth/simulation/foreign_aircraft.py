@@ -25,7 +25,7 @@ from airtruth.aircraft.probe import Constants, wheel_root
 from airtruth.aircraft.write import require_new
 from airtruth.errors import AircraftError, StoreError, choices
 from airtruth.isolation.client import call
-from airtruth.isolation.limits import Limits
+from airtruth.isolation.limits import ProcessLimits
 from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
@@ -38,7 +38,7 @@ CAMPAIGN: Final = "first.toml"
 """Name of the campaign that is written beside aircraft.toml."""
 LATERAL_CAMPAIGN: Final = "lateral.toml"
 """Name of the campaign in six axes, where aileron and rudder are found and a record with them keeps to its range."""
-_LIMITS: Final = Limits(seconds=900.0, memory_bytes=4_000_000_000)
+_LIMITS: Final = ProcessLimits(seconds=900.0, memory_bytes=4_000_000_000)
 """Limits of a survey (judgement: four engines and a slow machine need two minutes)."""
 _STICK_RAD: Final = 25.0 * DEG
 """Travel of the surface per unit of the stick where a fly-by-wire is bypassed [rad] (judgement: that of a fighter)."""

@@ -8,11 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.physics.longitudinal import ForceTables
 from airtruth.physics.motion import LATERAL
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.probe import Grid, forces_at_speeds, forces_over_alpha, probe, with_breaks
-from airtruth.simulation.probe_lateral import LateralGrid, LateralTables, probe_lateral
+from airtruth.simulation.probe import (
+    ForceGrid,
+    ForceTables,
+    forces_at_speeds,
+    forces_over_alpha,
+    probe,
+    with_breaks,
+)
+from airtruth.simulation.probe_lateral import LateralForceGrid, LateralTables, probe_lateral
 from airtruth.simulation.trim import Trim
 
 Array = NDArray[np.float64]
@@ -37,7 +43,7 @@ class OperatingPoint:
     derivatives: Linearisation
 
 
-def operating_point(aircraft: Aircraft, trim: Trim, grid: Grid, ratios: Array) -> OperatingPoint:
+def operating_point(aircraft: Aircraft, trim: Trim, grid: ForceGrid, ratios: Array) -> OperatingPoint:
     """Probe an aircraft about a trim.
 
     Parameters
@@ -53,7 +59,7 @@ def operating_point(aircraft: Aircraft, trim: Trim, grid: Grid, ratios: Array) -
     TrimError
         If the elevator surface does not follow its command at the trim.
     """
-    tables = probe(aircraft, trim, with_breaks(aircraft, trim, grid)).tables
+    tables = probe(aircraft, trim, with_breaks(aircraft, trim, grid))
     return OperatingPoint(
         tables=tables,
         at_speeds=forces_at_speeds(aircraft, trim, ratios),
@@ -70,7 +76,7 @@ class LateralOperatingPoint:
     derivatives: Linearisation
 
 
-def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -> LateralOperatingPoint:
+def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: LateralForceGrid) -> LateralOperatingPoint:
     """Probe the lateral forces of an aircraft about a trim in six axes.
 
     Parameters

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError
-from airtruth.physics.longitudinal import ForceTables, Longitudinal
-from airtruth.simulation.simulator import Condition, Controls, Executive, Response
+from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
 from airtruth.simulation.trim import Trim
-from airtruth.units import DEG, FT, G0, LBF
+from airtruth.units import DEG, G0, LBF
 
 Array = NDArray[np.float64]
 
@@ -45,7 +44,7 @@ _DIVE_RAD: Final = 60.0 * DEG
 
 
 @dataclass(frozen=True)
-class Grid:
+class ForceGrid:
     """States to evaluate; the trim's own value is added to each axis.
 
     Attributes
@@ -61,9 +60,27 @@ class Grid:
     airspeed: Array
 
 
+@dataclass(frozen=True)
+class ForceTables:
+    """X, Z, M over four increasing axes; linear between points, constant outside.
+
+    Attributes
+    ----------
+    airspeed_m_s, alpha_rad, elevator_rad, q_rad_s : axes (nv,) [m/s], (na,) [rad], (ne,) [rad], (nq,)
+        [rad/s]; at least two points each.
+    values : (nv, na, ne, nq, 3) forces X, Z along body x, z [N], moment M about the CG [N m].
+    """
+
+    airspeed_m_s: Array
+    alpha_rad: Array
+    elevator_rad: Array
+    q_rad_s: Array
+    values: Array
+
+
 def grid_about(
     trim: Trim, alpha_rad: float = 10.0 * DEG, command_rad: float = 6.0 * DEG, q_rad_s: float = 60.0 * DEG
-) -> Grid:
+) -> ForceGrid:
     """Return whole degrees of alpha and elevator near the trim, and pitch rates 12 deg/s apart.
 
     Whole degrees put points on the breaks of tables that are stated in degrees; q has one at zero.
@@ -74,7 +91,7 @@ def grid_about(
         first, last = np.ceil((centre - reach) / step), np.floor((centre + reach) / step)
         return np.arange(first, last + 1.0) * step
 
-    return Grid(
+    return ForceGrid(
         alpha_rad=whole(trim.alpha_rad, alpha_rad, DEG),
         command_rad=whole(trim.controls.elevator_command_rad, command_rad, DEG),
         q_rad_s=whole(0.0, q_rad_s, 12.0 * DEG),
@@ -83,8 +100,8 @@ def grid_about(
 
 
 def probe(
-    aircraft: Aircraft, trim: Trim, grid: Grid | None = None, dt_s: float = 1.0 / 200.0
-) -> Longitudinal:
+    aircraft: Aircraft, trim: Trim, grid: ForceGrid | None = None, dt_s: float = 1.0 / 200.0
+) -> ForceTables:
     """Tabulate X, Z, M of the aircraft at the trim's throttle and altitude, engines settled.
 
     Terms in alpha_dot, if a model has them, are those of the state itself, as in `airtruth.simulation.linearise`.
@@ -122,20 +139,10 @@ def probe(
         answer = states.respond(condition, alpha, controls, q)
         surface[at] = answer.elevator_rad
         values[at] = [*(node.get_double_value() * LBF for node in forces), answer.q_dot_rad_s2 * inertia]
-    gravity = executive.node("accelerations/gravity-ft_sec2").get_double_value() * FT
-    return Longitudinal(
-        tables=ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values),
-        mass_kg=trim.mass_kg,
-        inertia_kg_m2=inertia,
-        gravity_m_s2=gravity,
-        airspeed_m_s=trim.airspeed_m_s,
-        alpha_rad=trim.alpha_rad,
-        elevator_rad=trim.elevator_rad,
-        gamma_rad=trim.condition.gamma_rad,
-    )
+    return ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values)
 
 
-def with_breaks(aircraft: Aircraft, trim: Trim, grid: Grid, dt_s: float = 1.0 / 200.0) -> Grid:
+def with_breaks(aircraft: Aircraft, trim: Trim, grid: ForceGrid, dt_s: float = 1.0 / 200.0) -> ForceGrid:
     """Add the angles at which Z and M break between two angles of attack of a grid.
 
     X turns the flight path by the sine of the angle of attack alone, and its breaks are left out. The elevator is that of the
@@ -308,7 +315,7 @@ class HeldStates:
         *,
         p_rad_s: float = 0.0,
         r_rad_s: float = 0.0,
-    ) -> Response:
+    ) -> SimulatorResponse:
         """Response in a state of the grid."""
         rates = (q_rad_s, p_rad_s, r_rad_s)
         if not self.holds:
@@ -327,7 +334,7 @@ class HeldStates:
 
     def _settled(
         self, condition: Condition, alpha_rad: float, controls: Controls, rates: tuple[float, float, float]
-    ) -> Response:
+    ) -> SimulatorResponse:
         motion = (condition, alpha_rad, controls.sideslip_rad, controls.bank_rad, rates)
         if self.loses_power and motion == self.motion:
             self.executive.change_controls(controls, _FILTERS_S)

@@ -5,7 +5,7 @@ The forces over the angle of attack and the five signals of the motion are
     f(alpha, beta) + sum over p, r, aileron, rudder of [f(alpha, signal) - f(alpha, trim)],
 
 each table at the trim's values of the other signals. A table of all six would need a thousand times as many states; the
-products of two signals that the sum lacks are those that `airtruth.tracing.model.lateral_plant` states.
+products of two signals that the sum lacks are those that `airtruth.tracing.model.plant` states.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _HOLDS: Final = 12
 
 
 @dataclass(frozen=True)
-class LateralGrid:
+class LateralForceGrid:
     """States to evaluate; the trim's own value is added to each axis.
 
     Attributes
@@ -57,7 +57,7 @@ class LateralTables:
 
     Attributes
     ----------
-    alpha_rad : (alpha,) [rad]; signals : (points,) of each signal, breaks added, as in `LateralGrid`.
+    alpha_rad : (alpha,) [rad]; signals : (points,) of each signal, breaks added, as in `LateralForceGrid`.
     values : (signals,) of (alpha, points, 3) Y [N], L and N [N m] over each signal, the others at the trim.
     over_alpha : (speeds, alpha, 3) at the trim's signals and other airspeeds.
     """
@@ -113,7 +113,7 @@ class LateralStates:
         return np.asarray(np.array([node.get_double_value() for node in self._forces]) * _UNITS)
 
 
-def probe_lateral(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -> LateralTables:
+def probe_lateral(aircraft: Aircraft, trim: Trim, grid: LateralForceGrid) -> LateralTables:
     """Tabulate the lateral forces and moments at the trim's throttle, elevator and altitude.
 
     Parameters
@@ -170,4 +170,4 @@ def _with(axis: Array, value: float) -> Array:
     return np.sort(np.append(kept, value))
 
 
-__all__ = ["FORCES", "LateralGrid", "LateralStates", "LateralTables", "lateral_forces", "probe_lateral"]
+__all__ = ["FORCES", "LateralForceGrid", "LateralStates", "LateralTables", "lateral_forces", "probe_lateral"]

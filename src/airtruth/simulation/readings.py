@@ -15,7 +15,7 @@ from airtruth.units import FT, SLUG
 Array = NDArray[np.float64]
 
 _STATE: Final = ("airspeed_m_s", "alpha_rad", "theta_rad", "q_rad_s", "altitude_m", "density_kg_m3")
-"""Channels with a JSBSim property of their own, see `airtruth.channels.Signal.jsbsim`."""
+"""Channels with a JSBSim property of their own, see `airtruth.channels.LogChannel.jsbsim`."""
 READ: Final = (
     *(SIGNALS[name].jsbsim for name in _STATE),
     "forces/fbx-total-lbs",

@@ -92,7 +92,7 @@ class Controls:
 
 
 @dataclass(frozen=True)
-class Response:
+class SimulatorResponse:
     """Accelerations in body axes [m/s2], [rad/s2] and the surfaces [rad] in one state."""
 
     u_dot_m_s2: float
@@ -105,7 +105,7 @@ class Response:
     aileron_rad: float = 0.0
     rudder_rad: float = 0.0
 
-    def differs(self, other: Response) -> float:
+    def differs(self, other: SimulatorResponse) -> float:
         """Largest difference to another response [m/s2], [rad/s2], [rad]; infinite where one is not finite."""
         pairs = zip(astuple(self), astuple(other), strict=True)
         return max(d if math.isfinite(d) else math.inf for d in (abs(a - b) for a, b in pairs))
@@ -325,10 +325,10 @@ class Executive:
         names = [f"fcs/{kind}-cmd-norm[{i}]" for kind in kinds for i in range(count)]
         return [name for name in names if self._manager.hasNode(name)]
 
-    def respond(self) -> Response:
+    def respond(self) -> SimulatorResponse:
         """Return accelerations and surfaces in the present state."""
         fdm = self.fdm
-        return Response(
+        return SimulatorResponse(
             u_dot_m_s2=fdm["accelerations/udot-ft_sec2"] * FT,
             w_dot_m_s2=fdm["accelerations/wdot-ft_sec2"] * FT,
             q_dot_rad_s2=fdm["accelerations/qdot-rad_sec2"],

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
-from airtruth.simulation.simulator import Condition, Controls, Executive, Response
+from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
 from airtruth.units import DEG, FT, KT
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ class _Problem:
         """Condition of a vector of unknowns."""
         return replace(self.condition, gamma_rad=float(x[2])) if self.glides else self.condition
 
-    def respond(self, x: Array) -> Response:
+    def respond(self, x: Array) -> SimulatorResponse:
         """Response in the state of a vector of unknowns."""
         self.executive = self.executive.again()
         self.executive.initialise(self.path(x), float(x[0]), self.controls(x))
@@ -135,7 +135,7 @@ class _Problem:
         """(unknowns,) accelerations [m/s2], [rad/s2]."""
         return self.accelerations(self.respond(x))
 
-    def accelerations(self, r: Response) -> Array:
+    def accelerations(self, r: SimulatorResponse) -> Array:
         """(unknowns,) of a response."""
         every = (r.u_dot_m_s2, r.w_dot_m_s2, r.q_dot_rad_s2, r.v_dot_m_s2, r.p_dot_rad_s2, r.r_dot_rad_s2)
         return np.array(every[: self.count])

@@ -53,7 +53,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Proposal:
+class ProposedAircraft:
     """A proposed aircraft.toml.
 
     Attributes
@@ -65,7 +65,7 @@ class Proposal:
     summary: str
 
 
-def proposed_aircraft(name: str, known: Measured) -> Proposal:
+def proposed_aircraft(name: str, known: Measured) -> ProposedAircraft:
     """Propose an aircraft from its geometry.
 
     Parameters
@@ -110,7 +110,9 @@ def proposed_aircraft(name: str, known: Measured) -> Proposal:
         **{key: f"{value:.6g}" for key, value in numbers.items()},
     )
     table = [f"{key:8s} {value:8.3g} +- {stds[key]:.2g} 1/rad" for key, value in values.items()]
-    return Proposal(text, "\n".join(["derivatives by handbook formulas, with their scatter:", *table]))
+    return ProposedAircraft(
+        text, "\n".join(["derivatives by handbook formulas, with their scatter:", *table])
+    )
 
 
 def _planform(known: Measured) -> Planform:
@@ -141,4 +143,4 @@ def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-__all__ = ["TAIL_ASPECT_RATIO", "Measured", "Proposal", "proposed_aircraft"]
+__all__ = ["TAIL_ASPECT_RATIO", "Measured", "ProposedAircraft", "proposed_aircraft"]

@@ -69,7 +69,7 @@ class AxialSeries:
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class AxialTolerance:
     """Standard deviations of what the tracer does not estimate.
 
     Attributes
@@ -93,7 +93,7 @@ class Tolerance:
     scale: float = 0.01
 
 
-TOLERANCE: Final = Tolerance()
+TOLERANCE: Final = AxialTolerance()
 """Judgement: wind-tunnel slopes of the axial force to 10 %, an estimated bias of the vane to 0.1 deg or to its own size, because
 a learned function of the angle of attack and a bias imitate each other, a vane or a surface late by a quarter of a sample at 50
 Hz, and an accelerometer that is surveyed to some centimetres."""
@@ -259,4 +259,4 @@ def _slope(plant: Plant, signal: str) -> float:
     return float(np.interp(plant.trims[signal], axis, slopes))
 
 
-__all__ = ["CHANNEL", "TOLERANCE", "AxialSeries", "Tolerance", "axial_series"]
+__all__ = ["CHANNEL", "TOLERANCE", "AxialSeries", "AxialTolerance", "axial_series"]

@@ -74,7 +74,7 @@ class Treatment:
 
 
 @dataclass(frozen=True)
-class Condition:
+class RunCondition:
     """Derivatives of the aircraft with the traced effects, at one flight condition.
 
     Attributes
@@ -104,7 +104,7 @@ class Compensation:
     treatments : what happens to each effect.
     """
 
-    conditions: tuple[Condition, ...]
+    conditions: tuple[RunCondition, ...]
     aero: tuple[AeroTerm, ...] = ()
     states: tuple[StateTerm, ...] = ()
     from_trim: bool = False
@@ -133,7 +133,8 @@ def compensation_of(result: TraceResult) -> Compensation:
     records = result.case.fitted.records
     return Compensation(
         conditions=tuple(
-            Condition(float(r.signals.airspeed_m_s.mean()), r.plant.derivatives + increment) for r in records
+            RunCondition(float(r.signals.airspeed_m_s.mean()), r.plant.derivatives + increment)
+            for r in records
         ),
         aero=aero,
         states=states,
@@ -359,7 +360,7 @@ def _air_surface(terms: tuple[SurfaceTerm, ...], elevator: Array, dt_s: float) -
 
 __all__ = [
     "Compensation",
-    "Condition",
+    "RunCondition",
     "Treatment",
     "compensated_batch",
     "compensated_log",

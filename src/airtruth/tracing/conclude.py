@@ -46,22 +46,22 @@ from airtruth.tracing.increment_table import in_physical_terms, increment_rows, 
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.homogeneity import Homogeneity, homogeneity
 from airtruth.tracing.inference.hypothesis import is_curvature
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
 from airtruth.tracing.next_flight import next_flight
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
+from airtruth.tracing.record_differences import CERTAIN, differences
 from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.acceptance import Candidate
-from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.families import FRICTION
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.score_test import ScoreTable
 from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import alike_in_rivals
 from airtruth.tracing.stage_errors import Replay
@@ -116,7 +116,7 @@ def conclude(
     reserved = _reserved(case.fitted, last, shown, sets, declared, agreement)
     verdict = _verdict(shown, declared, agreement)
     if verdict == "unexplained" and declared.consistent:
-        anomaly = remaining = Anomaly(DIFFERENCES, agreement.statistic, agreement.degrees, agreement.p_value)
+        anomaly = remaining = agreement
     errors = stage_errors(stages)
     refined = _refined(stages, declared) if verdict == "none" else {}
     updated, replay = (None, None) if publish is None else publish(bool(refined))
@@ -204,10 +204,6 @@ def _verdict(
     if any(e.acts_on is not None for e in effects):
         return "learned"
     return "one_of" if any(e.indistinguishable_from for e in effects) else "traced"
-
-
-def _evidence(anomaly: Anomaly) -> Evidence:
-    return Evidence(anomaly.statistic, anomaly.p_value, anomaly.where)
 
 
 def _effect(
@@ -352,7 +348,7 @@ def _detectability(
     return detectability(rounds[-1].table) if rounds[-1].anomaly.p_value > ANOMALY_LEVEL else {}
 
 
-def detectability(table: Table) -> dict[str, float]:
+def detectability(table: ScoreTable) -> dict[str, float]:
     """Smallest size of each effect that the records can trace (noncentrality 16) and that is material, in its own unit.
 
     A bandwidth or a rate limit is stated as its value. An effect with several variants is listed under its name with
@@ -368,6 +364,10 @@ def detectability(table: Table) -> dict[str, float]:
         kept = found.get(s.effect.name)
         found[s.effect.name] = value if kept is None else (max if p.reciprocal else min)(kept, value)
     return found
+
+
+def _evidence(test: HypothesisTest) -> Evidence:
+    return Evidence(test.statistic, test.p_value, test.null)
 
 
 __all__ = ["conclude", "detectability", "estimates"]

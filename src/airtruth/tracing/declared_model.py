@@ -25,9 +25,13 @@ from airtruth.tracing.answer import (
     RefinedDerivative,
 )
 from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses
-from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, contradiction
+from airtruth.tracing.inference.derivative_likelihood import (
+    DERIVATIVES_MOVED,
+    DerivativeLikelihood,
+    contradiction,
+)
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.explanation import CauseSet, size_of
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.release import CONTRADICTED, Release, size_in_derivatives, size_in_filter
@@ -82,7 +86,7 @@ def declared_model(
             )
             for i, name in enumerate(problem.layout.motion.parameters)
         },
-        where=DERIVATIVES_MOVED if by_derivatives else anomaly.where,
+        where=DERIVATIVES_MOVED if by_derivatives else anomaly.null,
     )
 
 
@@ -127,7 +131,7 @@ def with_axial_force(declared: DeclaredModel, along: Sequence[AcceptedEffect]) -
     )
 
 
-def remaining_evidence(problem: TraceProblem, last: SearchRound) -> Anomaly:
+def remaining_evidence(problem: TraceProblem, last: SearchRound) -> HypothesisTest:
     """The strongest evidence of what the answer lacks: the last round's anomaly, or derivatives that nothing of it explains.
 
     Parameters
@@ -137,7 +141,7 @@ def remaining_evidence(problem: TraceProblem, last: SearchRound) -> Anomaly:
     test = contradiction(problem, last.null)
     if 2.0 * test.p_value >= last.anomaly.p_value:
         return last.anomaly
-    return Anomaly(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
+    return HypothesisTest(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
 
 
 def _apparent_shift(last: SearchRound, covariance: Array, causes: DeclaredCauses) -> tuple[Array, Array]:

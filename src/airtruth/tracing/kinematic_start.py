@@ -19,7 +19,7 @@ from airtruth.checks.kinematics import AIRSPEED, check_kinematics
 from airtruth.checks.kinematics_lateral import check_lateral
 from airtruth.checks.kinematics_record import declared_errors
 from airtruth.checks.kinematics_words import NAMED
-from airtruth.checks.result import Cause, CheckResult, Finding
+from airtruth.checks.result import CheckResult, Finding, PossibleCause
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
@@ -105,7 +105,7 @@ def sets_of(check: CheckResult | None, dt_s: float) -> tuple[frozenset[str], ...
     return tuple(dict.fromkeys(frozenset(_effects_of(cause, dt_s) | airspeed) for cause in check.possible))
 
 
-def _effects_of(cause: Cause, dt_s: float) -> set[str]:
+def _effects_of(cause: PossibleCause, dt_s: float) -> set[str]:
     """Effects of the library that a set of errors names; a share of a sample period is none."""
     return {
         f.name for f in cause.errors if f.name in EFFECTS and abs(f.value - f.declared) > _margin(f, dt_s)

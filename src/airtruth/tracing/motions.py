@@ -23,7 +23,7 @@ from airtruth.tracing.selection.budget import Advance
 
 
 @dataclass(frozen=True)
-class Part:
+class MotionTrace:
     """The trace of one motion.
 
     Attributes
@@ -50,7 +50,7 @@ class Part:
         return (lambda step: advance(f"{self.motion.name}: {step}")) if self.folder else advance
 
 
-def parts_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> tuple[Part, ...]:
+def parts_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> tuple[MotionTrace, ...]:
     """The motions to answer, in the order of the answers.
 
     Of two motions each is traced from the runs that excite it. A motion whose constants the aircraft lacks is left out where
@@ -68,10 +68,10 @@ def parts_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> tuple[Par
     """
     if options.motion is not None:
         values_of(aircraft, MOTIONS[options.motion])
-        return (Part(MOTIONS[options.motion], options),)
+        return (MotionTrace(MOTIONS[options.motion], options),)
     found = excited_motions(logs)
     if found == (LONGITUDINAL,):
-        return (Part(LONGITUDINAL, options),)
+        return (MotionTrace(LONGITUDINAL, options),)
     kept, notes = [], []
     for motion in found:
         try:
@@ -88,7 +88,7 @@ def parts_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> tuple[Par
     if len(kept) > 1:
         kept = [m for m in kept if names[m.name]] or kept[:1]
     return tuple(
-        Part(
+        MotionTrace(
             motion,
             replace(options, motion=motion.name, hold_out=_held(options.hold_out, names, names[motion.name])),
             motion.name if number else "",
@@ -169,4 +169,4 @@ def trace(
     return replace(first, others=tuple(others))
 
 
-__all__ = ["Part", "parts_of", "trace"]
+__all__ = ["MotionTrace", "parts_of", "trace"]

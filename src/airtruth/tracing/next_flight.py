@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.tracing.answer import ANOMALY_LEVEL, VerdictName
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.selection.acceptance import Candidate
-from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.families import advice
 
 
 def next_flight(
     effects: Sequence[tuple[Candidate, tuple[Candidate, ...]]],
     verdict: VerdictName,
-    remaining: Anomaly,
+    remaining: HypothesisTest,
     learned: Sequence[str],
     motion: Motion,
 ) -> str:
@@ -49,7 +49,7 @@ def next_flight(
             lines.append(f"Separate {', '.join(names)} as follows. {split}{computed}")
     lines += learned
     if remaining.p_value <= ANOMALY_LEVEL:
-        lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where, motion)}")
+        lines.append(f"The remaining residual shows in {remaining.null}: {advice(remaining.null, motion)}")
     return " ".join(lines) or (
         "Repeat the manoeuvre with the largest residual, with opposite "
         f"{' and '.join(c.name for c in motion.controls)} sign."

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airtruth.quantity import Quantity
 from airtruth.table import significant
@@ -17,8 +16,6 @@ from airtruth.tracing.replay import disagreement, worsened
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
 from airtruth.tracing.stages import Stages, in_closed_loop
-
-Array = NDArray[np.float64]
 
 _WORTH_A_NOTE: Final = 0.02
 """Share of correlated noise in a sensor's variance from which a note mentions it [-] (judgement: a smaller share

@@ -13,8 +13,6 @@ blind trials is below)."""
 CERTAIN: Final = 1e-6
 """Probability of the agreement of the records below which the verdict "none" becomes "unexplained" [-] (judgement: beyond
 doubt)."""
-DIFFERENCES: Final = "the differences between the records"
-"""Where the evidence shows."""
 _AGREE: Final = 0.01
 """Probability of the agreement of the others from which a record is named [-] (convention)."""
 
@@ -47,4 +45,4 @@ def differences(test: Homogeneity, records: Sequence[str], names: bool) -> list[
     ]
 
 
-__all__ = ["CERTAIN", "DIFFERENCES", "LEVEL", "differences"]
+__all__ = ["CERTAIN", "LEVEL", "differences"]

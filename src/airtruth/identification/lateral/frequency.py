@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError
 from airtruth.identification.estimates import JOINT, AnyScale, Estimates, Status, joined, mean_scale
-from airtruth.identification.lateral.observation import CONTROLS, Observation, observe
+from airtruth.identification.lateral.observation import CONTROLS, LateralObservation, observe
 from airtruth.identification.lateral.solve import regress_batch, regress_joint, solution
 from airtruth.identification.options import Options
 from airtruth.identification.record_constants import LateralValues
@@ -51,7 +51,7 @@ _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
 
 
-def spectra(o: Observation) -> tuple[Complex, Complex, Complex, Array]:
+def spectra(o: LateralObservation) -> tuple[Complex, Complex, Complex, Array]:
     """Transforms (runs, ..., frequencies) of regressors, left sides and nonlinear terms; and w [rad/s]."""
     samples = o.regressors.shape[2]
 

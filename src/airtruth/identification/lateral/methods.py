@@ -14,7 +14,7 @@ from airtruth.identification.lateral import frequency, likelihood
 from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
 from airtruth.identification.options import TERMS, Options
-from airtruth.identification.record_constants import LateralValues, Part, values_of
+from airtruth.identification.record_constants import EqualRuns, LateralValues, values_of
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.motion import LATERAL
 
@@ -42,7 +42,7 @@ def lateral_values(constants: AircraftConstants) -> LateralValues:
     return values
 
 
-def curvature_of(parts: Sequence[Part], options: Options) -> Counter[tuple[str, str]]:
+def curvature_of(parts: Sequence[EqualRuns], options: Options) -> Counter[tuple[str, str]]:
     """Number of runs that show a nonlinear term that is not free: (term, coefficient) -> runs (`lateral.curvature`)."""
     found: Counter[tuple[str, str]] = Counter()
     for part in parts:

@@ -63,7 +63,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Observation:
+class LateralObservation:
     """Regression of runs of one length, unfiltered.
 
     Attributes
@@ -206,7 +206,7 @@ def condition_of(batch: Batch, constants: LateralConstants, options: Options, kn
     return lateral_scale(constants, airspeed, density, alpha, theta)
 
 
-def observe(batch: Batch, constants: LateralConstants, options: Options) -> Observation:
+def observe(batch: Batch, constants: LateralConstants, options: Options) -> LateralObservation:
     """Return the regression of a batch; nothing is checked.
 
     Parameters
@@ -242,7 +242,7 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Obse
     window = window_samples(options, dt_s) if options.trim == "mean" else 1
     origin = regressors[..., :window].mean(axis=-1, keepdims=True)
     regressors = regressors - origin
-    return Observation(
+    return LateralObservation(
         dt_s=dt_s,
         regressors=regressors,
         slopes=slopes - slopes[..., :1],
@@ -258,7 +258,7 @@ __all__ = [
     "CONTROLS",
     "Each",
     "Known",
-    "Observation",
+    "LateralObservation",
     "assumed",
     "condition_of",
     "integrated",

@@ -28,7 +28,7 @@ from airtruth.identification.lateral.observation import (
     nonlinear_columns,
 )
 from airtruth.identification.likelihood.fit import Records
-from airtruth.identification.likelihood.kalman_kernel import Signals
+from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
 from airtruth.identification.likelihood.predictor import W_SHARES, W_START, Predictor, Term, layout
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
@@ -238,7 +238,7 @@ def records_of(
     floor = _FLOOR * y.std(axis=1)
     least = tuple(Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs))
     made = Predictor(**{**vars(predictor), "terms": (*predictor.terms, *least)})
-    return Records(batch.dt_s, Signals(y - y[:, :1], inputs, bend), layout(made, y.shape[0]), scale)
+    return Records(batch.dt_s, KalmanSignals(y - y[:, :1], inputs, bend), layout(made, y.shape[0]), scale)
 
 
 def outputs_of(batch: Batch) -> tuple[str, ...]:

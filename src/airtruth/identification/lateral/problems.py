@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from airtruth.identification.estimates import chosen
 from airtruth.identification.lateral.kernels import filter_rows, respond, steps
-from airtruth.identification.lateral.observation import CONTROLS, Observation
+from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
 from airtruth.numerics.prefilter import butterworth, zero_phase
@@ -55,7 +55,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Problem:
+class LateralProblem:
     """A regression whose instruments theta makes.
 
     Attributes
@@ -92,7 +92,7 @@ def free_of(z: Array, x: Array, y: Array, columns: Array) -> Rows:
     return Rows(own if z is x else without(z), own, without(y), basis)
 
 
-def with_corners(o: Observation) -> Array:
+def with_corners(o: LateralObservation) -> Array:
     """Regressors whose surfaces have, sample by sample, the area that they have between the samples.
 
     The corners of a servo behind a held command, sampled, change the moments of the surfaces by up to half a percent.
@@ -102,7 +102,7 @@ def with_corners(o: Observation) -> Array:
     return x
 
 
-def smoothed(o: Observation, options: Options) -> Rows:
+def smoothed(o: LateralObservation, options: Options) -> Rows:
     """Rows of least squares: low-passed signals, and fourth-order differences of the left sides."""
     sos = butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
     inside = slice(2, -2)
@@ -123,12 +123,12 @@ def picked(rows: Rows, active: Ints) -> Rows:
     return Rows(z, z if rows.z is rows.x else rows.x[active], rows.y[active], rows.free[active])
 
 
-def ls_problem(o: Observation, options: Options, rows: Rows) -> Problem:
+def ls_problem(o: LateralObservation, options: Options, rows: Rows) -> LateralProblem:
     """Least squares of `smoothed` rows: the regressors are their own instruments."""
-    return Problem(lambda theta, active: picked(rows, active), _all, rows.x.shape[0])
+    return LateralProblem(lambda theta, active: picked(rows, active), _all, rows.x.shape[0])
 
 
-def lowpass_problem(o: Observation, options: Options, rows: Rows) -> Problem:
+def lowpass_problem(o: LateralObservation, options: Options, rows: Rows) -> LateralProblem:
     """Instruments of the low-passed surfaces for the `smoothed` rows of least squares: IV(de_f) of the paper."""
     u = zero_phase(
         with_corners(o)[:, -len(CONTROLS) :], butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
@@ -144,10 +144,10 @@ def lowpass_problem(o: Observation, options: Options, rows: Rows) -> Problem:
             z - np.matmul(np.matmul(z, np.swapaxes(own.free, 1, 2)), own.free), own.x, own.y, own.free
         )
 
-    return Problem(at, lambda theta, active: bounded(o, theta, active), rows.x.shape[0])
+    return LateralProblem(at, lambda theta, active: bounded(o, theta, active), rows.x.shape[0])
 
 
-def f1_problem(o: Observation, options: Options, rows: Rows) -> Problem:
+def f1_problem(o: LateralObservation, options: Options, rows: Rows) -> LateralProblem:
     """Regressors, instruments and left sides behind F(p) = 1/Delta(p), Delta = |p I - A| of beta, p and r.
 
     Filters start from rest, and left sides count from the first sample, so that F p x = F x' holds exactly. Signals are
@@ -176,7 +176,7 @@ def f1_problem(o: Observation, options: Options, rows: Rows) -> Problem:
         added = out[:, count + coefficients : count + 2 * coefficients]
         return free_of(out[:, -count:], x, slopes + added, out[:, count + 2 * coefficients : -count])
 
-    return Problem(at, lambda theta, active: bounded(o, theta, active), u.shape[0])
+    return LateralProblem(at, lambda theta, active: bounded(o, theta, active), u.shape[0])
 
 
 def smooth_bend(u: Array) -> Array:
@@ -187,7 +187,7 @@ def smooth_bend(u: Array) -> Array:
     return bend
 
 
-def instruments(o: Observation, theta: Array, active: Ints, u: Array, bend: Array) -> Array:
+def instruments(o: LateralObservation, theta: Array, active: Ints, u: Array, bend: Array) -> Array:
     """States of the linear model driven by the surfaces, and the surfaces: (active, signals, samples), as the regressors."""
     scale = chosen(o.scale, active)
     linear = lateral_system(theta, scale)
@@ -209,7 +209,7 @@ def _discrete(systems: Array, dt_s: float) -> tuple[Array, Array, Array]:
     return phi, early, late
 
 
-def _denominator_step(o: Observation, theta: Array, active: Ints) -> tuple[Array, Array, Array]:
+def _denominator_step(o: LateralObservation, theta: Array, active: Ints) -> tuple[Array, Array, Array]:
     """Exact step of 1/Delta(p) in the states F u, p F u, p^2 F u."""
     a = lateral_system(theta, chosen(o.scale, active)).a[:, :_FAST, :_FAST]
     trace = np.trace(a, axis1=1, axis2=2)
@@ -221,7 +221,7 @@ def _denominator_step(o: Observation, theta: Array, active: Ints) -> tuple[Array
     return phi, np.ascontiguousarray(early[..., 0]), np.ascontiguousarray(late[..., 0])
 
 
-def bounded(o: Observation, theta: Array, active: Ints) -> Bools:
+def bounded(o: LateralObservation, theta: Array, active: Ints) -> Bools:
     """(active,) whether the motion of the linear model grows by less than `GROWTH` over the record."""
     a = lateral_system(theta, chosen(o.scale, active)).a
     duration_s = o.dt_s * o.regressors.shape[2]
@@ -231,7 +231,7 @@ def bounded(o: Observation, theta: Array, active: Ints) -> Bools:
 
 
 __all__ = [
-    "Problem",
+    "LateralProblem",
     "Rows",
     "f1_problem",
     "free_of",

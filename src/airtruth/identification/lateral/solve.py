@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from airtruth.identification.estimates import JOINT, Estimates, Status, joined, mean_scale
 from airtruth.identification.lateral.covariance import bread_of, meat, sandwich
-from airtruth.identification.lateral.observation import Each, Observation, observe
+from airtruth.identification.lateral.observation import Each, LateralObservation, observe
 from airtruth.identification.lateral.problems import (
-    Problem,
+    LateralProblem,
     Rows,
     f1_problem,
     lowpass_problem,
@@ -21,7 +21,7 @@ from airtruth.identification.lateral.problems import (
     smoothed,
 )
 from airtruth.identification.options import Options
-from airtruth.identification.regression.iterate import Outcome, repeat
+from airtruth.identification.regression.iterate import IterationOutcome, repeat
 from airtruth.identification.regression.solve import chunks
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.lateral import LateralConstants, LateralScale
@@ -30,7 +30,7 @@ from airtruth.physics.motion import LATERAL
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Pose = Callable[[Observation, Options, Rows], Problem]
+Pose = Callable[[LateralObservation, Options, Rows], LateralProblem]
 
 _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
@@ -59,9 +59,9 @@ def _normal(rows: Rows) -> tuple[Array, Array]:
 class _Several:
     """Problems of several observations as one."""
 
-    problems: Sequence[Problem]
+    problems: Sequence[LateralProblem]
 
-    def parts(self, theta: Array) -> Iterator[tuple[Problem, Array, Ints]]:
+    def parts(self, theta: Array) -> Iterator[tuple[LateralProblem, Array, Ints]]:
         """Each problem with the theta of its runs."""
         first = 0
         for problem in self.problems:
@@ -79,9 +79,9 @@ class _Several:
         return np.concatenate([problem.usable(own, runs) for problem, own, runs in self.parts(theta)])
 
 
-def _once(theta: Array) -> Outcome:
+def _once(theta: Array) -> IterationOutcome:
     status = np.where(np.isfinite(theta).all(axis=1), Status.CONVERGED, Status.SINGULAR).astype(np.int8)
-    return Outcome(theta, status, np.zeros(len(theta), dtype=np.int32))
+    return IterationOutcome(theta, status, np.zeros(len(theta), dtype=np.int32))
 
 
 def _iterated(
@@ -91,7 +91,7 @@ def _iterated(
     start: Array,
     options: Options,
     joint: bool,
-) -> Outcome:
+) -> IterationOutcome:
     failed = np.zeros(runs, dtype=np.bool_)
     with np.errstate(over="ignore", invalid="ignore"):
         return repeat(step, usable, failed, start, runs, options.tolerance, options.maximum_iterations, joint)
@@ -120,7 +120,7 @@ def regress_batch(
         if pose is not None:
             problem = pose(o, options, smooth)
 
-            def step(theta: Array, active: Ints, iteration: int, own: Problem = problem) -> Array:
+            def step(theta: Array, active: Ints, iteration: int, own: LateralProblem = problem) -> Array:
                 return solution(*_normal(own.rows(theta, active)))
 
             outcome = _iterated(step, problem.usable, problem.runs, outcome.theta, options, False)
@@ -130,7 +130,7 @@ def regress_batch(
     return _estimates(name, batch.run_ids, outcomes, np.concatenate(covariances), joined(scales), options)
 
 
-def _covariance(problem: Problem, outcome: Outcome, options: Options) -> Array:
+def _covariance(problem: LateralProblem, outcome: IterationOutcome, options: Options) -> Array:
     covariance = np.full((problem.runs, _COUNT, _COUNT), np.nan)
     known = np.flatnonzero(np.isin(outcome.status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS)))
     known = known[problem.usable(outcome.theta[known], known)]
@@ -196,7 +196,7 @@ def _joint_covariance(several: _Several, theta: Array, options: Options) -> Arra
 def _estimates(
     name: str,
     run_ids: tuple[str, ...],
-    outcomes: Sequence[Outcome],
+    outcomes: Sequence[IterationOutcome],
     covariance: Array,
     scale: LateralScale,
     options: Options,

@@ -21,10 +21,10 @@ from scipy.linalg import solve_discrete_lyapunov
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.likelihood.fit import records
-from airtruth.identification.likelihood.kalman_kernel import Signals
+from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
 from airtruth.identification.likelihood.linearise import Matrices, matrices, slopes
 from airtruth.identification.likelihood.options import FilterOptions, declared_values, free_parameters
-from airtruth.identification.likelihood.predictor import Layout
+from airtruth.identification.likelihood.predictor import LevelLayout
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.dryden import STARTS
 
@@ -68,7 +68,14 @@ class _Moments:
 
 
 def bound(
-    layout: Layout, run: int, z: Array, free: Ints, signals: Signals, dt_s: float, start: Array, unknown: Ints
+    layout: LevelLayout,
+    run: int,
+    z: Array,
+    free: Ints,
+    signals: KalmanSignals,
+    dt_s: float,
+    start: Array,
+    unknown: Ints,
 ) -> Array:
     """Smallest covariance of an unbiased estimate of the free parameters from one record.
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from airtruth.identification.condition import AircraftConstants, OneOrEach, each_batch, observe
 from airtruth.identification.estimates import JOINT, Estimates, S, mean_scale
 from airtruth.identification.likelihood.kalman import score
-from airtruth.identification.likelihood.kalman_kernel import Signals
+from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
 from airtruth.identification.likelihood.options import (
     CHANNELS,
     FilterOptions,
@@ -28,7 +28,7 @@ from airtruth.identification.likelihood.options import (
     free_parameters,
     prior_weights,
 )
-from airtruth.identification.likelihood.predictor import Layout, Term, extended, layout, short_period
+from airtruth.identification.likelihood.predictor import LevelLayout, Term, extended, layout, short_period
 from airtruth.identification.likelihood.pressure import products, with_pressure, with_trim_moment
 from airtruth.identification.likelihood.scoring import Maxima, Scored, Search, maximise
 from airtruth.identification.options import Options
@@ -59,8 +59,8 @@ class Records(Generic[S]):
     """
 
     dt_s: float
-    signals: Signals
-    layout: Layout
+    signals: KalmanSignals
+    layout: LevelLayout
     scale: S
 
 
@@ -95,7 +95,7 @@ def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) 
     bend[:, 1:] += (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
     return Records(
         dt_s=batch.dt_s,
-        signals=Signals(y - y[:, :1], np.ascontiguousarray(u), np.ascontiguousarray(bend)),
+        signals=KalmanSignals(y - y[:, :1], np.ascontiguousarray(u), np.ascontiguousarray(bend)),
         layout=layout(extended(predictor, least), y.shape[0]),
         scale=scale,
     )

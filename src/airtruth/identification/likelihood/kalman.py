@@ -27,12 +27,12 @@ from numpy.typing import NDArray
 from airtruth.identification.likelihood.kalman_kernel import (
     Filter,
     FilterSlopes,
-    Signals,
+    KalmanSignals,
     innovate,
     innovate_slopes,
 )
 from airtruth.identification.likelihood.linearise import Matrices, matrices, slopes
-from airtruth.identification.likelihood.predictor import Layout
+from airtruth.identification.likelihood.predictor import LevelLayout
 from airtruth.numerics.discretise import DOUBLINGS, riccati, whitener
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ RIDGE: Final = 1e-13
 memory of the start leaves its mean undetermined."""
 
 
-class Score(NamedTuple):
+class LikelihoodScore(NamedTuple):
     """The likelihood of runs, and the quantities that a step of scoring needs.
 
     Attributes
@@ -75,7 +75,9 @@ class _Profile(NamedTuple):
     residual: Array
 
 
-def score(layout: Layout, runs: Ints, z: Array, free: Ints, signals: Signals, dt_s: float) -> Score:
+def score(
+    layout: LevelLayout, runs: Ints, z: Array, free: Ints, signals: KalmanSignals, dt_s: float
+) -> LikelihoodScore:
     """J of runs with its gradient and information.
 
     A result does not depend on the other runs.
@@ -90,7 +92,7 @@ def score(layout: Layout, runs: Ints, z: Array, free: Ints, signals: Signals, dt
     dt_s : sample period [s].
     """
     samples, outputs = signals.y.shape[1:]
-    result = Score(
+    result = LikelihoodScore(
         np.full(runs.size, np.inf),
         np.zeros((runs.size, free.size)),
         np.zeros((runs.size, free.size, free.size)),
@@ -105,20 +107,20 @@ def score(layout: Layout, runs: Ints, z: Array, free: Ints, signals: Signals, dt
 
 
 def _score_block(
-    layout: Layout,
+    layout: LevelLayout,
     runs: Ints,
     z: Array,
     free: Ints,
-    signals: Signals,
+    signals: KalmanSignals,
     dt_s: float,
     block: Ints,
-    result: Score,
+    result: LikelihoodScore,
 ) -> None:
     """Fill the rows ``block`` of the result where J can be evaluated."""
     n, _, m, _ = layout.sizes
     steady, good = _steady(matrices(layout, runs, z, dt_s))
     runs, z, block = runs[good], z[good], block[good]
-    signals = Signals(*(part[runs] for part in signals))
+    signals = KalmanSignals(*(part[runs] for part in signals))
     samples, columns = signals.y.shape[1], 1 + n + m
     rows = np.empty((runs.size, columns + free.size, samples * m))
     innovate(steady.step, steady.white, steady.gain_p, signals, rows)
@@ -128,7 +130,7 @@ def _score_block(
     good = np.isfinite(gram).all(axis=(1, 2))
     if not good.all():
         runs, z, block, rows, gram = runs[good], z[good], block[good], rows[good], gram[good]
-        signals = Signals(*(part[good] for part in signals))
+        signals = KalmanSignals(*(part[good] for part in signals))
         steady = _chosen(steady, good)
     least = _profile(rows[:, :columns], gram, layout.precision, samples * steady.logdet)
     result.cost[block] = least.cost

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
-class Signals(NamedTuple):
+class KalmanSignals(NamedTuple):
     """Records of one length.
 
     Attributes
@@ -62,7 +62,7 @@ class FilterSlopes(NamedTuple):
 
 
 @njit(cache=True)
-def innovate(step: Matrices, white: Array, gain_p: Array, signals: Signals, rows: Array) -> None:
+def innovate(step: Matrices, white: Array, gain_p: Array, signals: KalmanSignals, rows: Array) -> None:
     """Whitened innovations of the data, and of a unit of each initial mean and bias, into rows.
 
     Parameters
@@ -137,7 +137,7 @@ def _moved_rows(slope: FilterSlopes, run: int) -> tuple[Bools, Bools, Bools, Boo
 
 @njit(cache=True)
 def innovate_slopes(
-    steady: Filter, slope: FilterSlopes, nuisance: Array, signals: Signals, rows: Array
+    steady: Filter, slope: FilterSlopes, nuisance: Array, signals: KalmanSignals, rows: Array
 ) -> None:
     """Derivatives of the whitened innovations along the trajectory of the estimated means and biases.
 

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.identification.likelihood.predictor import Layout
+from airtruth.identification.likelihood.predictor import LevelLayout
 from airtruth.numerics.discretise import TINY, assemble, step
 
 Array = NDArray[np.float64]
@@ -43,13 +43,13 @@ class _Terms(NamedTuple):
     moves: Ints
 
 
-def values_of(layout: Layout, z: Array) -> Array:
+def values_of(layout: LevelLayout, z: Array) -> Array:
     """Values of the parameters (runs, parameters) from z, which holds logarithms where the layout has them."""
     with np.errstate(over="ignore"):
         return np.where(layout.logarithmic == 1, np.exp(z), z)
 
 
-def matrices(layout: Layout, runs: Ints, z: Array, dt_s: float) -> Matrices:
+def matrices(layout: LevelLayout, runs: Ints, z: Array, dt_s: float) -> Matrices:
     """Matrices of runs, each with its own row of z; not finite where the step overflows.
 
     Parameters
@@ -70,7 +70,7 @@ def matrices(layout: Layout, runs: Ints, z: Array, dt_s: float) -> Matrices:
     return made
 
 
-def slopes(layout: Layout, runs: Ints, z: Array, free: Ints, dt_s: float) -> Matrices:
+def slopes(layout: LevelLayout, runs: Ints, z: Array, free: Ints, dt_s: float) -> Matrices:
     """Derivatives of `matrices` with respect to the free parameters, (runs, free, ...).
 
     Parameters

@@ -88,7 +88,7 @@ class Predictor:
 
 
 @dataclass(frozen=True)
-class Layout:
+class LevelLayout:
     """A predictor as arrays, which the compiled filter reads.
 
     Attributes
@@ -208,7 +208,7 @@ def extended(
     )
 
 
-def layout(predictor: Predictor, runs: int) -> Layout:
+def layout(predictor: Predictor, runs: int) -> LevelLayout:
     """Resolve names to indices.
 
     Raises
@@ -239,7 +239,7 @@ def layout(predictor: Predictor, runs: int) -> Layout:
         precision[np.ix_(index, index)] = np.linalg.inv(np.array(covariance))
     logarithmic = np.array([int(name in p.logarithmic) for name in p.parameters], dtype=np.int64)
     sizes = (n, len(p.inputs), len(p.outputs), len(p.parameters))
-    return Layout(location, coefficient, logarithmic, moves, precision, sizes)
+    return LevelLayout(location, coefficient, logarithmic, moves, precision, sizes)
 
 
 def _known(name: str, allowed: Sequence[str], term: Term) -> str:

@@ -13,7 +13,7 @@ from scipy.special import lambertw
 from airtruth.identification.estimates import Status
 from airtruth.numerics import levenberg_marquardt as solver
 from airtruth.numerics import normal_equations
-from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
+from airtruth.numerics.levenberg_marquardt_options import Damping, SolverOptions, Stopping
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -192,7 +192,7 @@ def maximise(evaluate: Callable[[Array, Ints], Scored], start: Array, search: Se
     problems = _Posterior(evaluate, declared, search.weight, free, search.level, search.to_prior)
     x = declared[:, free]
     x[:, :count] = start
-    how = Options(
+    how = SolverOptions(
         iterations=search.maximum_iterations,
         damping=DAMPING,
         # the decrement of the last step: tolerance^2/2 for a step of `tolerance` standard errors
@@ -215,10 +215,10 @@ def maximise(evaluate: Callable[[Array, Ints], Scored], start: Array, search: Se
 
 
 _STATUS: Final = {
-    solver.Status.CONVERGED: Status.CONVERGED,
-    solver.Status.ITERATIONS: Status.MAXIMUM_ITERATIONS,
-    solver.Status.STALLED: Status.MAXIMUM_ITERATIONS,
-    solver.Status.SINGULAR: Status.SINGULAR,
-    solver.Status.FAILED: Status.DIVERGED,
+    solver.SolverStatus.CONVERGED: Status.CONVERGED,
+    solver.SolverStatus.ITERATIONS: Status.MAXIMUM_ITERATIONS,
+    solver.SolverStatus.STALLED: Status.MAXIMUM_ITERATIONS,
+    solver.SolverStatus.SINGULAR: Status.SINGULAR,
+    solver.SolverStatus.FAILED: Status.DIVERGED,
 }
 """Status of an estimate for the end of its search."""

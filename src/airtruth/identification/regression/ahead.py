@@ -9,7 +9,7 @@ import numpy as np
 
 from airtruth.identification.regression import rows
 from airtruth.identification.regression.auxiliary import short_period
-from airtruth.identification.regression.dynamic_kernel import Model, Records, filtered_moments
+from airtruth.identification.regression.dynamic_kernel import DynamicModel, DynamicRecords, filtered_moments
 
 
 def _sum() -> None:
@@ -22,9 +22,9 @@ def _respond() -> None:
 
 def _filter() -> None:
     signals = np.empty((0, 4, 1))
-    records = Records(signals, np.empty((0, 1)), np.empty((0, 4)), signals, np.empty((0, 4)), 1.0)
+    records = DynamicRecords(signals, np.empty((0, 1)), np.empty((0, 4)), signals, np.empty((0, 4)), 1.0)
     none = np.empty(0, dtype=np.int64)
-    model = Model(np.empty((0, 6)), np.empty((0, 2)), np.empty((0, 3, 1)), none)
+    model = DynamicModel(np.empty((0, 6)), np.empty((0, 2)), np.empty((0, 3, 1)), none)
     filtered_moments(records, model, np.empty((0, 4, rows.COUNT - 3)))
 
 

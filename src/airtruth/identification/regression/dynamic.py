@@ -15,7 +15,12 @@ from airtruth.identification.condition import Observation, origin_of, relative
 from airtruth.identification.options import Options
 from airtruth.identification.regression import rows as layout
 from airtruth.identification.regression.auxiliary import bounded
-from airtruth.identification.regression.dynamic_kernel import Model, Records, filtered_moments, filtered_rows
+from airtruth.identification.regression.dynamic_kernel import (
+    DynamicModel,
+    DynamicRecords,
+    filtered_moments,
+    filtered_rows,
+)
 from airtruth.identification.regression.rows import NO_INSTRUMENTS, Problem, made_by
 from airtruth.identification.signals import ELEVATOR
 from airtruth.numerics.intersample import decay_of, servo_bend
@@ -68,7 +73,7 @@ def dynamic_problem(
     """
     signals, factors, dt_s = observation.signals, observation.factors, observation.dt_s
     origin = origin_of(signals, observation.window)
-    records = Records(
+    records = DynamicRecords(
         signals=signals,
         bend=servo_bend(signals[:, ELEVATOR], declared_decay=decay_of(observation.servo_s, dt_s)),
         origin=origin,
@@ -78,12 +83,12 @@ def dynamic_problem(
     )
     duration_s = dt_s * signals.shape[2]
 
-    def model(theta: Array, active: Ints) -> Model:
+    def model(theta: Array, active: Ints) -> DynamicModel:
         made = NO_INSTRUMENTS
         if options.auxiliary is not None:
             u = signals[active, ELEVATOR] - origin[active, ELEVATOR, None]
             made = made_by(options.auxiliary, theta, u, dt_s, observation.scale, active)
-        return Model(np.ascontiguousarray(theta), numerator(theta, factors[active]), made, active)
+        return DynamicModel(np.ascontiguousarray(theta), numerator(theta, factors[active]), made, active)
 
     def moments(theta: Array, active: Ints) -> Array:
         result = np.empty((active.size, 4, 7))

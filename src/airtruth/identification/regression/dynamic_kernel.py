@@ -45,7 +45,7 @@ _SCRATCH: Final = 18
 """Rows of scratch."""
 
 
-class Records(NamedTuple):
+class DynamicRecords(NamedTuple):
     """Signals of runs of one length.
 
     Attributes
@@ -66,7 +66,7 @@ class Records(NamedTuple):
     dt_s: float
 
 
-class Model(NamedTuple):
+class DynamicModel(NamedTuple):
     """Filter and auxiliary model of the active runs.
 
     Attributes
@@ -199,7 +199,7 @@ def subtract(out: Array, factor: float, x: Array) -> None:
 
 
 @inner
-def _filter_run(records: Records, model: Model, index: int, work: Array, w: Array) -> None:
+def _filter_run(records: DynamicRecords, model: DynamicModel, index: int, work: Array, w: Array) -> None:
     """Fill the rows w (10, samples) of the active run ``index``; work (18, samples) is scratch."""
     run = model.active[index]
     signals, origin, factors = records.signals[run], records.origin[run], records.factors[run]
@@ -261,7 +261,7 @@ def _filter_run(records: Records, model: Model, index: int, work: Array, w: Arra
 
 @awaited
 @njit(cache=True, error_model="numpy")
-def _filtered(records: Records, model: Model, rows: Array, moments: Array) -> None:
+def _filtered(records: DynamicRecords, model: DynamicModel, rows: Array, moments: Array) -> None:
     """Filtered rows, or where ``rows`` holds one run alone, the sums of products of each run."""
     work = np.empty((_SCRATCH, records.signals.shape[2]))
     for i in range(model.active.size):
@@ -271,11 +271,11 @@ def _filtered(records: Records, model: Model, rows: Array, moments: Array) -> No
             layout.products(w[:4], w[4:], moments[i])
 
 
-def filtered_moments(records: Records, model: Model, moments: Array) -> None:
+def filtered_moments(records: DynamicRecords, model: DynamicModel, moments: Array) -> None:
     """Sums of products (active, 4, 7) of the filtered rows, [Z | TRIM] against [X | Y | TRIM]."""
     _filtered(records, model, np.empty((1, layout.COUNT, records.signals.shape[2])), moments)
 
 
-def filtered_rows(records: Records, model: Model, rows: Array) -> None:
+def filtered_rows(records: DynamicRecords, model: DynamicModel, rows: Array) -> None:
     """Filtered rows (active, 10, samples), see `airtruth.identification.regression.rows`."""
     _filtered(records, model, rows, np.empty((0, 4, 7)))

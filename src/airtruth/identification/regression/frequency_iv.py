@@ -32,7 +32,7 @@ from airtruth.identification.regression.frequency import (
     transform,
 )
 from airtruth.identification.regression.frequency_kernel import instrumented_sums
-from airtruth.identification.regression.iterate import Outcome, repeat
+from airtruth.identification.regression.iterate import IterationOutcome, repeat
 from airtruth.identification.regression.rows import made_by, solve
 from airtruth.identification.regression.solve import assembled, chunks
 from airtruth.logs.flight_log import Batch
@@ -161,7 +161,9 @@ def _all_sums(regressions: Sequence[_Regression], theta: Array, members: Ints, j
     return np.asarray(np.concatenate(parts).sum(axis=0, keepdims=True))
 
 
-def _iterated(regressions: Sequence[_Regression], start: Array, options: Options, joint: bool) -> Outcome:
+def _iterated(
+    regressions: Sequence[_Regression], start: Array, options: Options, joint: bool
+) -> IterationOutcome:
     counts = [r.data.factors.shape[0] for r in regressions]
 
     def step(theta: Array, members: Ints, iteration: int) -> Array:
@@ -188,7 +190,9 @@ def _iterated(regressions: Sequence[_Regression], start: Array, options: Options
     )
 
 
-def _covariance(regressions: Sequence[_Regression], outcome: Outcome, options: Options, joint: bool) -> Array:
+def _covariance(
+    regressions: Sequence[_Regression], outcome: IterationOutcome, options: Options, joint: bool
+) -> Array:
     covariance = np.full((outcome.theta.shape[0], 6, 6), np.nan)
     known = np.flatnonzero(np.isin(outcome.status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS)))
     if options.covariance == "none" or known.size == 0:

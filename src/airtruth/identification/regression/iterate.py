@@ -25,7 +25,7 @@ LARGEST: Final = 1e6
 
 
 @dataclass(frozen=True)
-class Outcome:
+class IterationOutcome:
     """theta (runs, 6), status (runs,) and iterations (runs,); one row if joint."""
 
     theta: Array
@@ -33,7 +33,7 @@ class Outcome:
     iterations: NDArray[np.int32]
 
 
-def least_squares(problem: Equations, factors: Array, intercept: bool, joint: bool) -> Outcome:
+def least_squares(problem: Equations, factors: Array, intercept: bool, joint: bool) -> IterationOutcome:
     """Solve once, with instruments that do not depend on theta (eq. 5).
 
     Parameters
@@ -47,7 +47,7 @@ def least_squares(problem: Equations, factors: Array, intercept: bool, joint: bo
     moments = problem.moments(np.full((runs, 6), np.nan), np.arange(runs))
     theta = _solution(moments, factors, intercept, joint)
     status = np.where(np.isfinite(theta).all(axis=1), Status.CONVERGED, Status.SINGULAR).astype(np.int8)
-    return Outcome(theta, status, np.zeros(theta.shape[0], dtype=np.int32))
+    return IterationOutcome(theta, status, np.zeros(theta.shape[0], dtype=np.int32))
 
 
 def iterate(
@@ -58,7 +58,7 @@ def iterate(
     tolerance: float,
     maximum_iterations: int,
     joint: bool,
-) -> Outcome:
+) -> IterationOutcome:
     """Repeat eq. (9) until ||theta_i - theta_(i-1)|| <= tolerance ||theta_i|| (2-norm over the six).
 
     Each run ends by its own criterion, so that its result does not depend on the others.
@@ -87,7 +87,7 @@ def repeat(
     tolerance: float,
     maximum_iterations: int,
     joint: bool,
-) -> Outcome:
+) -> IterationOutcome:
     """Iterate any step towards its fixed point, run by run or jointly.
 
     Parameters
@@ -136,7 +136,7 @@ def repeat(
         active = active[~(singular | diverged | converged)]
     lost = ~np.isin(status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS))
     theta[lost] = np.nan
-    return Outcome(theta, status, iterations)
+    return IterationOutcome(theta, status, iterations)
 
 
 def _solution(moments: Array, factors: Array, intercept: bool, joint: bool) -> Array:

@@ -44,8 +44,8 @@ from airtruth.identification.condition import (
 from airtruth.identification.estimates import JOINT, Estimates, Status, joined, mean_scale
 from airtruth.identification.options import Options
 from airtruth.identification.regression.covariance import sandwich
-from airtruth.identification.regression.iterate import Outcome, repeat
-from airtruth.identification.regression.refined_kernel import WHITENING, Record, record_sums
+from airtruth.identification.regression.iterate import IterationOutcome, repeat
+from airtruth.identification.regression.refined_kernel import WHITENING, RefinedRun, record_sums
 from airtruth.identification.regression.rows import solve
 from airtruth.identification.regression.solve import assembled, chunks, regress_batch, regress_joint
 from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
@@ -64,14 +64,14 @@ SETTLING: Final = 8
 
 
 @dataclass(frozen=True)
-class Records:
+class RefinedRecords:
     """Runs as the kernel reads them, and the factors (runs,) of their flight conditions."""
 
-    runs: tuple[Record, ...]
+    runs: tuple[RefinedRun, ...]
     scale: Scale
 
 
-def records(batch: Batch, constants: AircraftConstants, options: Options) -> Records:
+def records(batch: Batch, constants: AircraftConstants, options: Options) -> RefinedRecords:
     """Signals as deviations, and the ratios of airspeed and pressure; nothing is checked."""
     observation = observe(batch, constants, replace(options, pressure="constant"))
     signals = observation.signals
@@ -85,10 +85,10 @@ def records(batch: Batch, constants: AircraftConstants, options: Options) -> Rec
     bend = servo_bend(signals[:, ELEVATOR], declared_decay=decay_of(batch.servo_s, batch.dt_s))
     signals = signals - origin_of(signals, observation.window)[:, :, None]
     runs = tuple(
-        Record(signals[r], smooth[r], bend[r], v[r], p[r], observation.factors[r], batch.dt_s)
+        RefinedRun(signals[r], smooth[r], bend[r], v[r], p[r], observation.factors[r], batch.dt_s)
         for r in range(signals.shape[0])
     )
-    return Records(runs, observation.scale)
+    return RefinedRecords(runs, observation.scale)
 
 
 def estimate(batch: Batch, constants: AircraftConstants, options: Options) -> Estimates:
@@ -163,7 +163,7 @@ def _covariance_name(options: Options) -> str:
 
 
 def _sums(
-    runs: Sequence[Record], theta: Array, active: Ints, options: Options, settled: bool, whitening: Array
+    runs: Sequence[RefinedRun], theta: Array, active: Ints, options: Options, settled: bool, whitening: Array
 ) -> Array:
     """Sums (active, 2, 3, 7) of the active runs, see `record_sums`; writes ``whitening`` unless settled."""
     sums = np.empty((active.size, 2, 3, 7))
@@ -173,7 +173,9 @@ def _sums(
     return sums
 
 
-def _solved(runs: Sequence[Record], start: Array, options: Options, joint: bool) -> tuple[Outcome, Array]:
+def _solved(
+    runs: Sequence[RefinedRun], start: Array, options: Options, joint: bool
+) -> tuple[IterationOutcome, Array]:
     """Iterate to the fixed point; the outcome and the whitening (runs, 2, WHITENING) at its end."""
     whitening = np.zeros((len(runs), 2, WHITENING))
 
@@ -192,7 +194,7 @@ def _solved(runs: Sequence[Record], start: Array, options: Options, joint: bool)
 
 
 def _covariance(
-    runs: Sequence[Record], outcome: Outcome, whitening: Array, options: Options, joint: bool
+    runs: Sequence[RefinedRun], outcome: IterationOutcome, whitening: Array, options: Options, joint: bool
 ) -> Array:
     covariance = np.full((outcome.theta.shape[0], 6, 6), np.nan)
     known = np.flatnonzero(np.isin(outcome.status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS)))

@@ -40,7 +40,7 @@ WHITENING: Final = REFLECTION + LARGEST_ORDER
 """Length of the whitening of an equation."""
 
 
-class Record(NamedTuple):
+class RefinedRun(NamedTuple):
     """Signals of one run.
 
     Attributes
@@ -290,7 +290,7 @@ def equation(
 
 @njit(cache=True)
 def record_sums(
-    record: Record, theta: Array, intercept: bool, settled: bool, whitening: Array, sums: Array
+    record: RefinedRun, theta: Array, intercept: bool, settled: bool, whitening: Array, sums: Array
 ) -> None:
     """Sums of products of the normal-force and the moment equation of one run.
 

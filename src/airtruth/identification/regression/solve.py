@@ -24,7 +24,7 @@ from airtruth.identification.regression.covariance import (
     products,
     sandwich,
 )
-from airtruth.identification.regression.iterate import Outcome, iterate, least_squares
+from airtruth.identification.regression.iterate import IterationOutcome, iterate, least_squares
 from airtruth.identification.regression.lowpass import ls_problem
 from airtruth.identification.regression.rows import Equations, Problem, Projected, project
 from airtruth.logs.flight_log import Batch
@@ -107,7 +107,7 @@ def regress_joint(
 def assembled(
     name: str,
     run_ids: tuple[str, ...],
-    outcomes: Sequence[Outcome],
+    outcomes: Sequence[IterationOutcome],
     covariances: Sequence[Array],
     scale: Scale,
     covariance_name: str,
@@ -147,7 +147,7 @@ def chunks(batch: Batch) -> Iterator[Batch]:
         )
 
 
-def _solve(observation: Observation, pose: Pose | None, options: Options) -> tuple[Problem, Outcome]:
+def _solve(observation: Observation, pose: Pose | None, options: Options) -> tuple[Problem, IterationOutcome]:
     problem = ls_problem(observation, options)
     factors = observation.factors
     outcome = least_squares(problem, factors, options.trim == "intercept", joint=False)
@@ -157,7 +157,9 @@ def _solve(observation: Observation, pose: Pose | None, options: Options) -> tup
     return problem, outcome
 
 
-def _iterate(problem: Equations, factors: Array, start: Array, options: Options, joint: bool) -> Outcome:
+def _iterate(
+    problem: Equations, factors: Array, start: Array, options: Options, joint: bool
+) -> IterationOutcome:
     return iterate(
         problem,
         factors,
@@ -170,7 +172,7 @@ def _iterate(problem: Equations, factors: Array, start: Array, options: Options,
 
 
 def _covariance(
-    problem: Problem, outcome: Outcome, factors: Array, intercept: bool, options: Options
+    problem: Problem, outcome: IterationOutcome, factors: Array, intercept: bool, options: Options
 ) -> Array:
     covariance = np.full((factors.shape[0], 6, 6), np.nan)
     if options.covariance == "none":

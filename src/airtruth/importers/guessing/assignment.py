@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.importers.guessing.evidence import RELATIONS, Finding, Relation, compared
+from airtruth.importers.guessing.evidence import RELATIONS, SlotFinding, SlotRelation, compared
 from airtruth.importers.guessing.readings import Reading
 from airtruth.importers.guessing.sides import are_sides
 from airtruth.importers.guessing.slots import ALL_SLOTS, SLOTS
@@ -51,11 +51,11 @@ class Decision:
     reading: Reading
     lead: float
     rival: Reading | None
-    findings: tuple[Finding, ...]
+    findings: tuple[SlotFinding, ...]
     others: tuple[Reading, ...]
 
 
-class Search:
+class AssignmentSearch:
     """A beam search over slots, whose criterion is the sum of the evidence of names, units and physics."""
 
     def __init__(
@@ -63,14 +63,14 @@ class Search:
         readings: Mapping[str, Sequence[Reading]],
         dt_s: float,
         slots: Mapping[str, tuple[str, ...]] = SLOTS,
-        relations: Sequence[Relation] = RELATIONS,
+        relations: Sequence[SlotRelation] = RELATIONS,
         given: Mapping[str, Reading] | None = None,
     ) -> None:
         """Readings of the slots that are searched, the relations that are tested, and readings of other slots that are given."""
         self.dt_s = dt_s
         self.relations, self.given = relations, dict(given or {})
         self.readings = {slot: _plausible(readings.get(slot, ())) for slot in slots}
-        self._cache: dict[tuple[int, ...], Finding] = {}
+        self._cache: dict[tuple[int, ...], SlotFinding] = {}
 
     def score(self, state: State) -> float:
         """Evidence of an assignment."""
@@ -98,9 +98,9 @@ class Search:
                 total -= 30.0
         return total
 
-    def findings(self, state: State) -> list[tuple[tuple[str, ...], Finding]]:
+    def findings(self, state: State) -> list[tuple[tuple[str, ...], SlotFinding]]:
         """Relations whose slots are all filled."""
-        result: list[tuple[tuple[str, ...], Finding]] = []
+        result: list[tuple[tuple[str, ...], SlotFinding]] = []
         if not self.dt_s:
             return result
         filled = {slot: r for slot, r in state.items() if r is not None}
@@ -178,4 +178,4 @@ def _plausible(readings: Sequence[Reading]) -> list[Reading]:
     return [r for r in ranked if r.evidence > ranked[0].evidence - HOPELESS][:PER_SLOT]
 
 
-__all__ = ["CERTAIN", "Decision", "Search"]
+__all__ = ["CERTAIN", "AssignmentSearch", "Decision"]

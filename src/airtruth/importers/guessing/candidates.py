@@ -12,8 +12,16 @@ from numpy.typing import NDArray
 
 from airtruth.channels import LATERAL
 from airtruth.importers.attitude import euler_angles
-from airtruth.importers.dictionary import DIMENSIONS, QUATERNION, VELOCITY, Entry, Lexicon, Words, compact
-from airtruth.importers.guessing.columns import Clock, Column
+from airtruth.importers.dictionary import (
+    DIMENSIONS,
+    QUATERNION,
+    VELOCITY,
+    DictionaryEntry,
+    Lexicon,
+    Words,
+    compact,
+)
+from airtruth.importers.guessing.columns import Column, GroupClock
 from airtruth.importers.guessing.readings import Candidates, Reading
 from airtruth.importers.guessing.sides import mixed_with, pair
 from airtruth.importers.guessing.slots import ALL_SLOTS, OPPOSITE, SIGN, SIGNED, SLOT_OF, TURNING, size_of
@@ -44,13 +52,13 @@ MIXED: Final = "one of several surfaces that are elevator and aileron together"
 
 
 @dataclass(frozen=True)
-class Grid:
+class CommonTimes:
     """Common times on which readings are compared [s]; the step is 0 where the file has no times, and t_s counts rows."""
 
     t_s: Array
     dt_s: float
 
-    def of(self, column: Column, clocks: Mapping[str, Clock], turn: float = 0.0) -> Array | None:
+    def of(self, column: Column, clocks: Mapping[str, GroupClock], turn: float = 0.0) -> Array | None:
         """Values of a column on the grid; None where it has no times or hardly any value. ``turn`` is the jump of an angle."""
         t = times_of(column, clocks) if self.dt_s else np.arange(float(len(column.values)))
         if t is None or len(t) != len(column.values):
@@ -65,7 +73,7 @@ class Grid:
         return np.asarray(np.interp(self.t_s, t[order], x))
 
 
-def times_of(column: Column, clocks: Mapping[str, Clock]) -> Array | None:
+def times_of(column: Column, clocks: Mapping[str, GroupClock]) -> Array | None:
     """Times of a column [s]: its own, those of its group, or those of the file."""
     if column.t_s is not None:
         return column.t_s
@@ -85,12 +93,12 @@ def rising(t: Array) -> Array:
 
 
 def candidates(
-    columns: Sequence[Column], words: Lexicon, grid: Grid, clocks: Mapping[str, Clock]
+    columns: Sequence[Column], words: Lexicon, grid: CommonTimes, clocks: Mapping[str, GroupClock]
 ) -> Candidates:
     """Every reading that names, units and ranges allow."""
     found, parts_of_pairs = Candidates(), Candidates()
     parts: dict[tuple[str, str], Column] = {}
-    turned: dict[tuple[str, Entry, str], dict[int, Column]] = {}
+    turned: dict[tuple[str, DictionaryEntry, str], dict[int, Column]] = {}
     forward, down = ({c.group for c in columns if compact(c.name) in (x, x + "body")} for x in "uw")
     velocities = forward & down
     for column in columns:
@@ -98,7 +106,9 @@ def candidates(
         if known is not None:
             entry, part = known
             if entry.quaternion:
-                numbers = [i for i, one in enumerate(entry.match) if Entry((one,)).matches(column.full)]
+                numbers = [
+                    i for i, one in enumerate(entry.match) if DictionaryEntry((one,)).matches(column.full)
+                ]
                 turned.setdefault((column.group, entry, part.title), {})[numbers[0]] = column
             elif entry.synthetic:
                 found.synthetic.append((column, entry.refuse or ""))
@@ -190,9 +200,9 @@ def _read(
     channel: str,
     evidence: float,
     named: str,
-    grid: Grid,
-    clocks: Mapping[str, Clock],
-    entry: Entry | None,
+    grid: CommonTimes,
+    clocks: Mapping[str, GroupClock],
+    entry: DictionaryEntry | None,
 ) -> None:
     """Add the readings of a column as a channel: units that are not excluded, and both signs."""
     slot = SLOT_OF.get(channel)
@@ -256,8 +266,8 @@ def _attitude(
     four: tuple[Column, ...],
     order: str,
     title: str,
-    grid: Grid,
-    clocks: Mapping[str, Clock],
+    grid: CommonTimes,
+    clocks: Mapping[str, GroupClock],
 ) -> None:
     evidence = FORMAT if title else EXACT
     parts = [grid.of(column, clocks) for column in four]
@@ -277,7 +287,9 @@ def _attitude(
             found.readings.setdefault(slot, []).append(reading)
 
 
-def _velocity(found: Candidates, three: tuple[Column, ...], grid: Grid, clocks: Mapping[str, Clock]) -> None:
+def _velocity(
+    found: Candidates, three: tuple[Column, ...], grid: CommonTimes, clocks: Mapping[str, GroupClock]
+) -> None:
     u, w = grid.of(three[0], clocks), grid.of(three[-1], clocks)
     if u is None or w is None:
         return
@@ -299,4 +311,4 @@ def _velocity(found: Candidates, three: tuple[Column, ...], grid: Grid, clocks: 
             )  # fmt: skip
 
 
-__all__ = ["MIXED", "Grid", "candidates", "rising", "times_of"]
+__all__ = ["MIXED", "CommonTimes", "candidates", "rising", "times_of"]

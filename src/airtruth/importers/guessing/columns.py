@@ -98,7 +98,7 @@ def split(label: str, words: Lexicon) -> tuple[str, Unit | None]:
 
 
 @dataclass(frozen=True)
-class Clock:
+class GroupClock:
     """Times of a group of columns.
 
     column : column with the times; None where the file gives each column its own.
@@ -111,9 +111,9 @@ class Clock:
     reason: str
 
 
-def clocks_of(columns: Sequence[Column], words: Lexicon) -> dict[str, Clock]:
+def clocks_of(columns: Sequence[Column], words: Lexicon) -> dict[str, GroupClock]:
     """Group -> its time column; "" for the whole file."""
-    found: dict[str, Clock] = {}
+    found: dict[str, GroupClock] = {}
     for one in columns:
         entry = words.entry(one.full)
         known = entry[0].unit if entry is not None and entry[0].channel == "t_s" else ""
@@ -132,18 +132,18 @@ def clocks_of(columns: Sequence[Column], words: Lexicon) -> dict[str, Clock]:
         unnamed = next((c for c in columns if _is_even(c)), None)
         if unnamed is not None:
             reason = "a column without a name that increases evenly"
-            found[unnamed.group] = Clock(unnamed, "s", unnamed.values, reason)
+            found[unnamed.group] = GroupClock(unnamed, "s", unnamed.values, reason)
     return found
 
 
-def _clock(column: Column, stated: str) -> Clock | None:
+def _clock(column: Column, stated: str) -> GroupClock | None:
     steps = np.diff(column.values[np.isfinite(column.values)])
     if not len(steps) or not np.any(steps > 0.0):
         return None
     step = float(np.median(steps[steps > 0.0]))
     unit = stated or next((u for u, (low, high) in _STEPS.items() if low <= step <= high), "s")
     reason = "dates" if column.date else "stated" if stated else f"assumed by its step of {step:.4g}"
-    return Clock(column, unit, column.values * TIME_UNITS[unit], reason)
+    return GroupClock(column, unit, column.values * TIME_UNITS[unit], reason)
 
 
 def _is_even(c: Column) -> bool:
@@ -158,4 +158,4 @@ def _is_even(c: Column) -> bool:
     return bool(np.ptp(np.diff(even)) <= JITTER * step and _CLOCK_STEP_S[0] <= step <= _CLOCK_STEP_S[1])
 
 
-__all__ = ["Clock", "Column", "clocks_of", "columns_of", "split"]
+__all__ = ["Column", "GroupClock", "clocks_of", "columns_of", "split"]

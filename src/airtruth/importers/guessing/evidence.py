@@ -37,7 +37,7 @@ MOST: Final = 10.0
 
 
 @dataclass(frozen=True)
-class Finding:
+class SlotFinding:
     """A relation that was tested: logarithm of its likelihood ratio, and the figure in words."""
 
     log_ratio: float
@@ -45,11 +45,11 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Relation:
+class SlotRelation:
     """Slots that a relation needs and is evidence for, its test, and slots that it uses where they are filled."""
 
     needs: tuple[str, ...]
-    test: Callable[[Mapping[str, Array], float], Finding]
+    test: Callable[[Mapping[str, Array], float], SlotFinding]
     uses: tuple[str, ...] = ()
 
 
@@ -92,16 +92,16 @@ def _density(deviation: float, std: float, broad: float) -> float:
 
 def moved(
     name: str, words: str, degree: int, y: Callable[..., Array], x: Callable[..., Array]
-) -> Callable[..., Finding]:
-    def test(c: Mapping[str, Array], dt_s: float) -> Finding:
+) -> Callable[..., SlotFinding]:
+    def test(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
         ratio, factor, share = compared(y(c), x(c, dt_s), dt_s, degree)
-        return Finding(ratio, f"{name} is {factor:.3g} of {words} (R2 {share:.2f})")
+        return SlotFinding(ratio, f"{name} is {factor:.3g} of {words} (R2 {share:.2f})")
 
     return test
 
 
-def near(deviation: float, std: float, broad: float, words: str) -> Finding:
-    return Finding(_density(deviation, std, broad) if np.isfinite(deviation) else 0.0, words)
+def near(deviation: float, std: float, broad: float, words: str) -> SlotFinding:
+    return SlotFinding(_density(deviation, std, broad) if np.isfinite(deviation) else 0.0, words)
 
 
 def _attitude(c: Mapping[str, Array], dt_s: float) -> Array:
@@ -145,17 +145,17 @@ def _climbed(c: Mapping[str, Array], dt_s: float) -> Array:
     return integral(c["airspeed"] * np.sin(c["theta"] - c["alpha"]), dt_s)
 
 
-def _weight(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _weight(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     mean = float(np.median(c["az"]))
     return near(mean / G0 + 1.0, 0.12, 2.0, f"the median of az is {mean / G0:.2f} g")
 
 
-def _axial(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _axial(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     off = float(np.median(c["ax"] - G0 * np.sin(np.clip(c["theta"], -1.5, 1.5)))) / G0
     return near(off, 0.05, 0.5, f"the median of ax departs by {off:+.3f} g from g sin(theta)")
 
 
-def _level(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _level(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     off = float(np.median(c["theta"] - c["alpha"]))
     return near(off, 0.12, 1.0, f"the median of theta - alpha is {np.degrees(off):.1f} deg")
 
@@ -175,11 +175,11 @@ def effect(rate: Array, causes: Sequence[Array], dt_s: float) -> tuple[float, fl
         return float(factors.value[0, 0]), float(np.sqrt(factors.covariance[0, 0, 0]))
 
 
-def _pitches(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _pitches(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     return moves(*control(c, dt_s), 15.0, "the elevator changes q'")
 
 
-def moves(value: float, std: float, usual: float, words: str) -> Finding:
+def moves(value: float, std: float, usual: float, words: str) -> SlotFinding:
     """Evidence of an effect of a surface that has to be negative.
 
     The two signs differ by the logarithm of the odds of a negative effect, half of which counts for each.
@@ -189,7 +189,7 @@ def moves(value: float, std: float, usual: float, words: str) -> Finding:
     value, std : effect and its standard deviation [1/s2]; usual : size of that of an aircraft [1/s2].
     """
     if not (np.isfinite(value) and std > 0.0):
-        return Finding(0.0, "it does not move")
+        return SlotFinding(0.0, "it does not move")
     t = value / std
     signed = float(np.clip(0.5 * (log_ndtr(-t) - log_ndtr(t)), -0.5 * MOST, 0.5 * MOST))
     size = (
@@ -197,10 +197,10 @@ def moves(value: float, std: float, usual: float, words: str) -> Finding:
         if abs(t) > 3
         else 0.0
     )
-    return Finding(signed + size, f"{words} by {value:+.3g} +- {std:.2g} 1/s2")
+    return SlotFinding(signed + size, f"{words} by {value:+.3g} +- {std:.2g} 1/s2")
 
 
-def _lifts(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _lifts(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     """Lift follows alpha = theta - gamma, gamma the integral of the load over V: az = -a (theta + integral(az + g)/V)."""
     theta, load = c["theta"] if "theta" in c else integral(c["q"], dt_s), c["az"] + G0
     causes = (
@@ -219,19 +219,19 @@ def _lifts(c: Mapping[str, Array], dt_s: float) -> Finding:
         )
         std = float(np.sqrt(max(variance, 0.0) + 0.2**2))
     if not (np.isfinite([slope, speed, std]).all() and slope > 0.0 and speed > 0.0 and std < 0.6):
-        return Finding(0.0, "the lift does not show it")
+        return SlotFinding(0.0, "the lift does not show it")
     off = float(np.log(max(float(np.mean(c["airspeed"])), 1e-3) / speed))
     return near(off, std, 2.0, f"the airspeed is {np.exp(off):.2f} of that which lift and pitch rate require")
 
 
-def _ground(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _ground(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     ratio = float(np.median(c["airspeed"])) / max(float(np.median(c["ground_speed"])), 1e-3)
     return near(
         float(np.log(max(ratio, 1e-6))), 0.3, 2.0, f"the airspeed is {ratio:.2f} of the speed over ground"
     )
 
 
-def _air(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _air(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     standard = density_kg_m3(np.clip(np.median(c["altitude"]), -500.0, 20000.0))
     ratio = float(np.median(c["density"]) / standard)
     return near(
@@ -242,7 +242,7 @@ def _air(c: Mapping[str, Array], dt_s: float) -> Finding:
     )
 
 
-def _pressure_height(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _pressure_height(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     off = float(np.median(c["altitude"] - c["gps_altitude"]))
     return near(off / 250.0, 1.0, 40.0, f"the altitude is {off:+.0f} m from the satellites' altitude")
 
@@ -255,27 +255,27 @@ _LIFTED = moved(
 )
 _FLOWN = moved("the altitude", "the integral of V sin(theta - alpha)", 2, lambda c: c["altitude"], _climbed)
 RELATIONS: Final = (
-    Relation(("az",), _weight),
-    Relation(("theta", "q"), _TURNED),
-    Relation(("ax", "theta"), _axial),
-    Relation(("alpha", "theta"), _level),
-    Relation(("alpha", "q", "az", "airspeed"), _HEAVED, ("theta", "ax")),
-    Relation(("airspeed", "theta", "q", "az", "ax"), _DRAWN, ("alpha",)),
-    Relation(("airspeed", "az", "q"), _lifts, ("theta", "elevator")),
-    Relation(("altitude", "theta", "az"), _LIFTED, ("ax",)),
-    Relation(("altitude", "theta", "alpha", "airspeed"), _FLOWN),
-    Relation(("elevator", "q", "az"), _pitches, ("alpha", "airspeed", "theta")),
-    Relation(("airspeed", "ground_speed"), _ground),
-    Relation(("density", "altitude"), _air),
-    Relation(("altitude", "gps_altitude"), _pressure_height),
+    SlotRelation(("az",), _weight),
+    SlotRelation(("theta", "q"), _TURNED),
+    SlotRelation(("ax", "theta"), _axial),
+    SlotRelation(("alpha", "theta"), _level),
+    SlotRelation(("alpha", "q", "az", "airspeed"), _HEAVED, ("theta", "ax")),
+    SlotRelation(("airspeed", "theta", "q", "az", "ax"), _DRAWN, ("alpha",)),
+    SlotRelation(("airspeed", "az", "q"), _lifts, ("theta", "elevator")),
+    SlotRelation(("altitude", "theta", "az"), _LIFTED, ("ax",)),
+    SlotRelation(("altitude", "theta", "alpha", "airspeed"), _FLOWN),
+    SlotRelation(("elevator", "q", "az"), _pitches, ("alpha", "airspeed", "theta")),
+    SlotRelation(("airspeed", "ground_speed"), _ground),
+    SlotRelation(("density", "altitude"), _air),
+    SlotRelation(("altitude", "gps_altitude"), _pressure_height),
 )
 """Everything that is tested. A relation uses further slots where they are assigned."""
 
 __all__ = [
     "MOST",
     "RELATIONS",
-    "Finding",
-    "Relation",
+    "SlotFinding",
+    "SlotRelation",
     "compared",
     "control",
     "effect",

@@ -19,7 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.checks.spectra import integral
-from airtruth.importers.guessing.evidence import Finding, Relation, compared, effect, moved, moves, near
+from airtruth.importers.guessing.evidence import (
+    SlotFinding,
+    SlotRelation,
+    compared,
+    effect,
+    moved,
+    moves,
+    near,
+)
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -55,32 +63,32 @@ def _turning(c: Mapping[str, Array]) -> Array:
     return np.asarray(c["r"] * np.cos(alpha) - c.get("p", zero) * np.sin(alpha))
 
 
-def _turned(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _turned(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     """The turn that bank and side force require, where no sideslip tells the rest."""
     if "beta" in c:
-        return Finding(0.0, "beta tells more")
+        return SlotFinding(0.0, "beta tells more")
     ratio, factor, share = compared(integral(_turning(c), dt_s), integral(_pull(c), dt_s), dt_s, 1)
-    return Finding(
+    return SlotFinding(
         ratio, f"the turn is {factor:.3g} of that which bank and side force require (R2 {share:.2f})"
     )
 
 
-def _rolls(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _rolls(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     others = [c[name] for name in ("p", "r", "beta") if name in c]
     return moves(*effect(c["p"], [c["aileron"], *others], dt_s), 30.0, "the aileron changes p'")
 
 
-def _yaws(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _yaws(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     others = [c[name] for name in ("r", "p", "beta" if "beta" in c else "ay") if name in c]
     return moves(*effect(c["r"], [c["rudder"], *others], dt_s), 6.0, "the rudder changes r'")
 
 
-def _centred(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _centred(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     mean = float(np.median(c["ay"])) / G0
     return near(mean, 0.08, 1.0, f"the median of ay is {mean:+.3f} g")
 
 
-def _coordinated(c: Mapping[str, Array], dt_s: float) -> Finding:
+def _coordinated(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     mean = float(np.median(c["beta"]))
     return near(mean, 0.08, 0.8, f"the median of beta is {np.degrees(mean):+.1f} deg")
 
@@ -97,16 +105,16 @@ _SLIPPED = moved(
 _AILERON = moved("the aileron", "its command", 1, lambda c: c["aileron"], lambda c, dt: c["aileron_command"])
 _RUDDER = moved("the rudder", "its command", 1, lambda c: c["rudder"], lambda c, dt: c["rudder_command"])
 LATERAL_RELATIONS: Final = (
-    Relation(("ay",), _centred),
-    Relation(("beta",), _coordinated),
-    Relation(("phi", "p"), _BANKED, ("theta", "q", "r")),
-    Relation(("psi", "r"), _HEADED, ("theta", "q", "phi")),
-    Relation(("beta", "ay", "phi", "r", "airspeed"), _SLIPPED, ("p", "theta", "alpha")),
-    Relation(("r", "phi", "ay", "airspeed"), _turned, ("p", "theta", "alpha", "beta")),
-    Relation(("aileron", "p"), _rolls, ("r", "beta")),
-    Relation(("rudder", "r"), _yaws, ("p", "beta", "ay")),
-    Relation(("aileron", "aileron_command"), _AILERON),
-    Relation(("rudder", "rudder_command"), _RUDDER),
+    SlotRelation(("ay",), _centred),
+    SlotRelation(("beta",), _coordinated),
+    SlotRelation(("phi", "p"), _BANKED, ("theta", "q", "r")),
+    SlotRelation(("psi", "r"), _HEADED, ("theta", "q", "phi")),
+    SlotRelation(("beta", "ay", "phi", "r", "airspeed"), _SLIPPED, ("p", "theta", "alpha")),
+    SlotRelation(("r", "phi", "ay", "airspeed"), _turned, ("p", "theta", "alpha", "beta")),
+    SlotRelation(("aileron", "p"), _rolls, ("r", "beta")),
+    SlotRelation(("rudder", "r"), _yaws, ("p", "beta", "ay")),
+    SlotRelation(("aileron", "aileron_command"), _AILERON),
+    SlotRelation(("rudder", "rudder_command"), _RUDDER),
 )
 """Everything that is tested of the lateral-directional motion. A relation uses further slots where they are assigned."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth.channels import REQUIRED, SIGNALS
 from airtruth.importers.guessing.assignment import CERTAIN, Decision
-from airtruth.importers.guessing.candidates import MIXED, Grid
+from airtruth.importers.guessing.candidates import MIXED, CommonTimes
 from airtruth.importers.guessing.columns import Column
 from airtruth.importers.guessing.evidence import control
 from airtruth.importers.guessing.readings import Candidates, Reading
@@ -54,7 +54,7 @@ class Writer:
         decisions: Mapping[str, Decision],
         found: Candidates,
         times: Times,
-        grid: Grid,
+        grid: CommonTimes,
     ) -> None:
         self.decisions, self.found, self.times, self.grid = decisions, found, times, grid
         self.mapped: set[str] = set()

@@ -14,7 +14,7 @@ from airtruth.foreign.source import Source
 from airtruth.importers.clock import Clocked, increasing
 from airtruth.importers.guessing.assignment import Decision
 from airtruth.importers.guessing.candidates import times_of
-from airtruth.importers.guessing.columns import Clock, Column
+from airtruth.importers.guessing.columns import Column, GroupClock
 from airtruth.importers.uniform import GAP, even_times
 from airtruth.logs.validate import JITTER, single_precision_s
 
@@ -40,13 +40,13 @@ class Times:
     run : column that names the run of each row; "" if there is none.
     """
 
-    clocks: Mapping[str, Clock]
+    clocks: Mapping[str, GroupClock]
     decisions: Mapping[str, Decision]
     own: bool
     run: str = ""
 
     @property
-    def base(self) -> Clock | None:
+    def base(self) -> GroupClock | None:
         """Clock of the file, or of the group of most channels."""
         if "" in self.clocks or not self.clocks:
             return self.clocks.get("")
@@ -98,7 +98,7 @@ class Times:
         return _USUAL_HZ
 
 
-def run_column(source: Source, clocks: Mapping[str, Clock]) -> str:
+def run_column(source: Source, clocks: Mapping[str, GroupClock]) -> str:
     """Column that keeps one value, which no other rows have, until the time starts again or pauses; "" if none does."""
     base = clocks.get("")
     if base is None or not source.ordered:

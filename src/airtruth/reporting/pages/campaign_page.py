@@ -14,12 +14,12 @@ from airtruth.identification.charts import Frames, intervals_chart
 from airtruth.logs.names import ESTIMATES as FILES
 from airtruth.logs.sources import Logs
 from airtruth.physics.motion import Motion
-from airtruth.reporting.campaign import Campaign, Parted
+from airtruth.reporting.campaign import FlownCampaign, Parted
 from airtruth.reporting.pages.estimates_page import shifts_of
 from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
 from airtruth.reporting.pages.headline import headline
 from airtruth.reporting.pages.identified import SIMULATED, Identified, read_identified, simulates
-from airtruth.reporting.pages.motions import Part, report_of
+from airtruth.reporting.pages.motions import PagePart, report_of
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table
 from airtruth.reporting.pages.records import records_section, records_tables
@@ -58,7 +58,7 @@ def campaign_report(
     return report_of(campaigns[0].title or campaigns[0].name, parts)
 
 
-def _part(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> Part:
+def _part(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> PagePart:
     motion = campaign.motion
     shown = _tables(campaign)
     laid_out = [lay_out(table) for table in shown]
@@ -97,7 +97,7 @@ def _part(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> Par
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
         origin_section(histories, of_methods(identified.records), facts, motion),
     )
-    return Part(
+    return PagePart(
         answer=answer_html(*headline(statistics, flown, campaign.runs, confidence, motion)),
         picture=chart,
         sections=sections,
@@ -126,7 +126,7 @@ def _flown(campaign: Parted) -> tuple[int, dict[str, float]]:
         return count, dict(zip(names, (total / count).tolist(), strict=True))
 
 
-def _frame(campaign: Campaign) -> pd.DataFrame:
+def _frame(campaign: FlownCampaign) -> pd.DataFrame:
     """The estimates of a part as rows of contract 2, one method after another."""
     import pandas as pd
 

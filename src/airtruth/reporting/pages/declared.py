@@ -33,7 +33,7 @@ _SPREAD: Final = 0.32
 
 
 @dataclass(frozen=True)
-class Declared:
+class DeclaredDerivatives:
     """Declared derivatives at a flight condition.
 
     Attributes
@@ -56,7 +56,7 @@ class Declared:
         return pd.concat([own, estimates], ignore_index=True)
 
 
-def declared_at(aircraft: Aircraft, histories: Histories) -> Declared:
+def declared_at(aircraft: Aircraft, histories: Histories) -> DeclaredDerivatives:
     """Derivatives of an aircraft at the mean condition of records: linearised in JSBSim, or as aircraft.toml states them.
 
     Raises
@@ -73,14 +73,14 @@ def declared_at(aircraft: Aircraft, histories: Histories) -> Declared:
     at = None if aircraft.file.jsbsim is None else trim_of(aircraft, airspeed, density, altitude, 0.0)
     values = declared_derivatives(aircraft, at)
     std = np.sqrt(np.diagonal(declared_covariance(aircraft, values)))
-    return Declared(
+    return DeclaredDerivatives(
         dict(zip(LONGITUDINAL.parameters, values.tolist(), strict=True)),
         dict(zip(LONGITUDINAL.parameters, std.tolist(), strict=True)),
         f"{airspeed:.4g} m/s, {density:.4g} kg/m3",
     )
 
 
-def shifts_chart(declared: Declared, estimates: pd.DataFrame) -> Chart:
+def shifts_chart(declared: DeclaredDerivatives, estimates: pd.DataFrame) -> Chart:
     """Shift of each derivative by each method from its declaration, over the declared standard deviation."""
     methods = list(dict.fromkeys(map(str, estimates["method"])))
     offsets = np.linspace(-_SPREAD, _SPREAD, len(methods)) if len(methods) > 1 else np.zeros(1)
@@ -100,7 +100,7 @@ def shifts_chart(declared: Declared, estimates: pd.DataFrame) -> Chart:
     )
 
 
-def shifts_table(declared: Declared, estimates: pd.DataFrame) -> Table:
+def shifts_table(declared: DeclaredDerivatives, estimates: pd.DataFrame) -> Table:
     """Declared value, and mean and shift of each method."""
     methods = list(dict.fromkeys(map(str, estimates["method"])))
     rows: list[Row] = []
@@ -124,4 +124,4 @@ def _mean(estimates: pd.DataFrame, method: str, name: str) -> tuple[float, float
     return value, low, high
 
 
-__all__ = ["MODEL", "Declared", "declared_at", "shifts_chart", "shifts_table"]
+__all__ = ["MODEL", "DeclaredDerivatives", "declared_at", "shifts_chart", "shifts_table"]

@@ -26,7 +26,7 @@ from airtruth.reporting.pages.identified import (
     require_same_aircraft,
     simulates,
 )
-from airtruth.reporting.pages.motions import Part, report_of
+from airtruth.reporting.pages.motions import PagePart, report_of
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table
 from airtruth.reporting.pages.records import records_section, records_tables
@@ -43,7 +43,7 @@ from airtruth.table import as_latex
 if TYPE_CHECKING:
     import pandas as pd
 
-    from airtruth.reporting.pages.declared import Declared
+    from airtruth.reporting.pages.declared import DeclaredDerivatives
 
 _OVER_RUNS: Final = "Correlation over the converged runs."
 """Explanation of a correlation from the scatter of the runs."""
@@ -62,7 +62,7 @@ def estimates_report(title: str, identified: Sequence[Identified]) -> Report:
     return report_of(title, {motion_of(one.frame.columns).name: _part(one) for one in identified})
 
 
-def _part(identified: Identified) -> Part:
+def _part(identified: Identified) -> PagePart:
     frame, histories = identified.frame, identified.histories
     with np.errstate(over="ignore", invalid="ignore"):  # diverged estimates overflow in means
         table = overview(frame, identified.confidence)
@@ -92,7 +92,7 @@ def _part(identified: Identified) -> Part:
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
         origin_section(histories, of_methods(identified.records), dict.fromkeys(notes), motion),
     )
-    return Part(
+    return PagePart(
         answer=answer_html(*answer_of(frame)),
         picture=chart,
         sections=sections,
@@ -102,7 +102,9 @@ def _part(identified: Identified) -> Part:
     )
 
 
-def shifts_of(declared: Declared | None, estimates: pd.DataFrame) -> tuple[tuple[Chart, ...], Section]:
+def shifts_of(
+    declared: DeclaredDerivatives | None, estimates: pd.DataFrame
+) -> tuple[tuple[Chart, ...], Section]:
     """Return chart and section of the shifts from the declared aircraft; without one, none and an empty section."""
     heading, anchor = "Shifts from the declared aircraft", "shifts"
     if declared is None:

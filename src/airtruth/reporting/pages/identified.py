@@ -14,7 +14,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError, ConfigurationError, StoreError
 from airtruth.identification.estimates import JOINT
 from airtruth.identification.methods import DEFAULT
-from airtruth.identification.record_constants import Constants, values_of
+from airtruth.identification.record_constants import RecordConstants, values_of
 from airtruth.identification.simulated import simulated_records, spaced
 from airtruth.identification.store import other_constants
 from airtruth.identification.stored import Record, read_stored
@@ -27,7 +27,7 @@ from airtruth.table import significant
 if TYPE_CHECKING:
     import pandas as pd
 
-    from airtruth.reporting.pages.declared import Declared
+    from airtruth.reporting.pages.declared import DeclaredDerivatives
 
 SIMULATED: Final = (
     "Simulation: the linear short period with the derivatives of each method, from the measured elevator, at the mean "
@@ -54,7 +54,7 @@ class Identified:
     records: Mapping[str, Record]
     histories: Histories | None
     reason: str = ""
-    declared: Declared | None = None
+    declared: DeclaredDerivatives | None = None
 
     @property
     def confidence(self) -> float:
@@ -159,7 +159,7 @@ def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record], r
         raise StoreError("the estimates do not state the constants of their aircraft; identify again")
     own = next(iter(records.values()))
     taken = own.get("sensors", {})
-    return simulated_records(logs, frame, Constants(**own["constants"]), of_runs=runs, taken=taken)
+    return simulated_records(logs, frame, RecordConstants(**own["constants"]), of_runs=runs, taken=taken)
 
 
 def _beside(folder: Path, records: Mapping[str, Record]) -> tuple[list[str], str]:

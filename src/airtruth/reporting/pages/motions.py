@@ -14,7 +14,7 @@ from airtruth.table import Group, Row, Table, as_csv
 
 
 @dataclass(frozen=True)
-class Part:
+class PagePart:
     """One motion on a page.
 
     Attributes
@@ -35,7 +35,7 @@ class Part:
     charts: tuple[Chart, ...]
 
 
-def report_of(title: str, parts: Mapping[str, Part]) -> Report:
+def report_of(title: str, parts: Mapping[str, PagePart]) -> Report:
     """Return a report; of several motions, each has its answer, chart and sections under its heading.
 
     Parameters
@@ -93,4 +93,4 @@ def _spread(own: Sequence[str], row: Row, columns: Sequence[str]) -> Row:
     return tuple(cells.get(name, "") for name in columns)
 
 
-__all__ = ["Part", "report_of", "stacked"]
+__all__ = ["PagePart", "report_of", "stacked"]

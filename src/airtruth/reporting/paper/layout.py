@@ -13,7 +13,7 @@ from airtruth.errors import counted
 from airtruth.reporting.paper import published
 from airtruth.reporting.paper.comparison import RUNS, together
 from airtruth.reporting.paper.published import DECIMALS
-from airtruth.reporting.paper.tables import PRINTED_STATISTICS, THRESHOLD, TRUTH, Entry, PaperTable
+from airtruth.reporting.paper.tables import PRINTED_STATISTICS, THRESHOLD, TRUTH, PaperEntry, PaperTable
 from airtruth.table import MISSING, Cell, Group, Number, Pair, Row, Table
 
 MARK: Final = "*"
@@ -149,11 +149,11 @@ def _beside(table: PaperTable, parameter: str, statistic: str, label: str, decim
         yield PUBLISHED if exact else DERIVED, "", *printed
 
 
-def _ours(entry: Entry, decimals: int) -> Number:
+def _ours(entry: PaperEntry, decimals: int) -> Number:
     return Number(entry.value, decimals, mark=MARK if entry.differs else "")
 
 
-def _printed(entry: Entry, decimals: int | None = None) -> Cell:
+def _printed(entry: PaperEntry, decimals: int | None = None) -> Cell:
     """Published number, by default with the decimals of the paper."""
     if entry.published is None:
         return MISSING
@@ -162,7 +162,7 @@ def _printed(entry: Entry, decimals: int | None = None) -> Cell:
     return Number(entry.published.value, decimals)
 
 
-def _printed_pair(first: Entry, second: Entry) -> Cell:
+def _printed_pair(first: PaperEntry, second: PaperEntry) -> Cell:
     mean, std = _printed(first), _printed(second)
     return Pair(mean, std) if isinstance(mean, Number) and isinstance(std, Number) else MISSING
 

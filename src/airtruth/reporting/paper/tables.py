@@ -81,7 +81,7 @@ class TableSpec:
 
 
 @dataclass(frozen=True)
-class Entry:
+class PaperEntry:
     """One number of a table.
 
     Attributes
@@ -133,7 +133,7 @@ class PaperTable:
     methods: tuple[str, ...]
     absent: tuple[str, ...]
     statistics: Mapping[str, MethodStatistics]
-    entries: Mapping[tuple[str, str, str], Entry]
+    entries: Mapping[tuple[str, str, str], PaperEntry]
 
 
 TABLES: Final[Mapping[str, TableSpec]] = {
@@ -237,7 +237,7 @@ def evaluate(
             numbers[every, "relerr_ratio"] = _ratio(stats, method, spec.reference)
         beside = _beside(spec, method, stats)
         entries += [
-            Entry(method, parameter, statistic, value, se, *beside.get((parameter, statistic), ()))
+            PaperEntry(method, parameter, statistic, value, se, *beside.get((parameter, statistic), ()))
             for (parameter, statistic), (value, se) in numbers.items()
         ]
     variant = "" if campaign.name == spec.campaign else campaign.name.removeprefix(spec.campaign)
@@ -272,11 +272,13 @@ def long_form(table: PaperTable) -> Table:
     return flat(table.spec.title, LONG_COLUMNS, rows)
 
 
-def _truth(campaign: Parted, with_published: bool) -> Iterator[Entry]:
+def _truth(campaign: Parted, with_published: bool) -> Iterator[PaperEntry]:
     printed = published.load().truth
     for name, value in zip(campaign.motion.estimated, average_truth(campaign), strict=True):
         # a true value has no Monte Carlo error and is therefore not compared
-        yield Entry(TRUTH, name, "true", float(value), published=printed[name] if with_published else None)
+        yield PaperEntry(
+            TRUTH, name, "true", float(value), published=printed[name] if with_published else None
+        )
 
 
 def _numbers(s: MethodStatistics, motion: Motion) -> Iterator[tuple[comparison.Key, tuple[float, float]]]:

@@ -15,7 +15,7 @@ from airtruth.errors import ConfigurationError
 from airtruth.physics.gust_figures import FIGURES, LEVELS
 from airtruth.simulation.campaign.effect_table import EffectTable
 from airtruth.simulation.campaign.manoeuvre_table import ManoeuvreTable
-from airtruth.simulation.campaign.tables import Constant, Draw, Table, one_of
+from airtruth.simulation.campaign.tables import Constant, Draw, UnitTable, one_of
 from airtruth.simulation.manoeuvres import ELEVATOR
 
 NO_GUST: Final = "none"
@@ -26,7 +26,7 @@ MOST_STEPS: Final = 4e6
 """Simulation steps of a run [-] (judgement: an hour at 1 kHz; planning it takes 3 s)."""
 
 
-class ConditionTable(Table):
+class ConditionTable(UnitTable):
     """Where runs start: level or steady climb, EAS [m/s], geometric altitude [m], flight path [rad].
 
     straight: a lateral campaign trims with the wings level, or without sideslip and with a bank.
@@ -39,7 +39,7 @@ class ConditionTable(Table):
     straight: Literal["wings-level", "no-sideslip"] = "wings-level"
 
 
-class GustTable(Table):
+class GustTable(UnitTable):
     """Dryden gusts; ``factor`` multiplies the level's standard deviations.
 
     lateral: side gusts, with ``rotary`` those in roll and yaw; where it is not stated, the lateral campaigns have them.
@@ -56,7 +56,7 @@ class GustTable(Table):
     _known_level = field_validator("level")(one_of((NO_GUST, *LEVELS)))
 
 
-class WindTable(Table):
+class WindTable(UnitTable):
     """Constant wind along the track, tailwind positive [m/s].
 
     keeps = "true_airspeed": the trim has the stated EAS whatever the wind, so on a flat, non-rotating
@@ -69,7 +69,7 @@ class WindTable(Table):
     keeps: Literal["true_airspeed", "ground_speed"] = "true_airspeed"
 
 
-class SensorTable(Table):
+class SensorTable(UnitTable):
     """Sensors of the aircraft, or none (ideal), or with stated entries instead of the aircraft's."""
 
     ideal: bool = False
@@ -95,7 +95,7 @@ class SensorTable(Table):
         return result
 
 
-class AugmentationTable(Table):
+class AugmentationTable(UnitTable):
     """Gains of the aircraft's pitch damper [s] and attitude hold [-], and of a yaw damper and a bank hold.
 
     The latter two are flown beside the aircraft's model, see `airtruth.simulation.lateral_feedback`: yaw_damper_gain_s of the
@@ -116,7 +116,7 @@ class AugmentationTable(Table):
         return bool(self.yaw_damper_gain_s or self.bank_gain or self.roll_damper_gain_s)
 
 
-class Campaign(Table):
+class Campaign(UnitTable):
     """A campaign file, in SI."""
 
     dimensions: ClassVar[dict[str, str]] = {"duration": "time"}

@@ -45,7 +45,7 @@ FILES: Final = "files"
 
 
 @dataclass(frozen=True)
-class State:
+class FolderState:
     """A campaign's folder before anything is flown.
 
     Attributes
@@ -148,7 +148,7 @@ def clean(out: Path) -> None:
         clear(folder)
 
 
-def inspect(plan: Plan, out: Path) -> State:
+def inspect(plan: Plan, out: Path) -> FolderState:
     """Return what a folder holds of a campaign, every file compared with its digest.
 
     Raises
@@ -188,7 +188,7 @@ def inspect(plan: Plan, out: Path) -> State:
         damaged.append(_sentence(out / TRUTH, TRUTH))
     same = recorded.head.get("runs") == plan.campaign.runs and len(chunks) == len(sizes)
     finished = same and not damaged and recorded.closed and not (out / PARTS).exists()
-    return State(tuple(chunks), tuple(damaged), finished)
+    return FolderState(tuple(chunks), tuple(damaged), finished)
 
 
 def begin(plan: Plan, out: Path, chunks: Sequence[FlownChunk]) -> tuple[FlownChunk, ...]:

@@ -7,14 +7,14 @@ from typing import Any, ClassVar, Final, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from airtruth.simulation.campaign.tables import Constant, Draw, Table, one_of
+from airtruth.simulation.campaign.tables import Constant, Draw, UnitTable, one_of
 from airtruth.simulation.manoeuvres import CONTROLS, ELEVATOR, KINDS, MOST_HARMONICS
 
 MOST_INPUTS: Final = 8
 """Control inputs of a run [-] (judgement: three controls, two or three inputs each)."""
 
 
-class InputTable(Table):
+class InputTable(UnitTable):
     """One control input; see `airtruth.simulation.manoeuvres.Manoeuvre`. file, run_id, channel: a log to replay."""
 
     dimensions: ClassVar[dict[str, str]] = {

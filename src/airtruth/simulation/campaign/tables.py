@@ -119,7 +119,7 @@ def one_of(names: Iterable[str]) -> Callable[[str], str]:
     return check
 
 
-class Table(Strict):
+class UnitTable(Strict):
     """A table whose keys may end in a unit of their dimension in ``dimensions``."""
 
     dimensions: ClassVar[dict[str, str]] = {}
@@ -136,8 +136,8 @@ __all__ = [
     "Distribution",
     "Draw",
     "Normal",
-    "Table",
     "Uniform",
+    "UnitTable",
     "distribution",
     "one_of",
 ]

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from airtruth.simulation.campaign.effect_table import EffectTable
 from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.campaign.tables import Constant, Distribution, Table
+from airtruth.simulation.campaign.tables import Constant, Distribution, UnitTable
 from airtruth.toml_values import toml_value
 from airtruth.units import UNITS
 
@@ -50,7 +50,7 @@ def _is_table(value: object) -> bool:
 
 def _entries(model: BaseModel) -> Iterator[tuple[str, Any]]:
     """Keys with their SI unit, and values, of the fields that differ from their defaults."""
-    dimensions = model.dimensions if isinstance(model, Table) else {}
+    dimensions = model.dimensions if isinstance(model, UnitTable) else {}
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
         if (

@@ -24,7 +24,7 @@ _DENSITY: Final = 1.225
 
 
 @dataclass(frozen=True)
-class Bench:
+class ModelBench:
     """A model and a state to examine it in.
 
     Attributes
@@ -48,7 +48,7 @@ class Bench:
         file = AircraftFile.model_construct(name=name, jsbsim=self.model)
         return Aircraft(folder=self.folder, file=file, constants=self.constants)
 
-    def known(self, **changes: object) -> Bench:
+    def known(self, **changes: object) -> ModelBench:
         """The bench with other entries of the [jsbsim] table."""
         return replace(self, model=self.model.model_copy(update=changes))
 
@@ -87,7 +87,7 @@ class Bench:
         return executive
 
 
-def bench(folder: Path, model: JsbsimModel, altitude_m: float = 1500.0, lift: float = 0.45) -> Bench:
+def bench(folder: Path, model: JsbsimModel, altitude_m: float = 1500.0, lift: float = 0.45) -> ModelBench:
     """A bench at the airspeed at which a lift coefficient carries the weight.
 
     Parameters
@@ -95,7 +95,7 @@ def bench(folder: Path, model: JsbsimModel, altitude_m: float = 1500.0, lift: fl
     altitude_m : altitude [m]; lift : coefficient [-].
     """
     unknown = Constants(wing_area_m2=1.0, chord_m=1.0, span_m=1.0, mass_kg=1.0, inertia_yy_kg_m2=1.0)
-    first = Bench(folder, model, unknown, Condition(60.0, altitude_m))
+    first = ModelBench(folder, model, unknown, Condition(60.0, altitude_m))
     constants = constants_of(first.at().fdm)
     return replace(first, constants=constants, condition=Condition(eas_of(constants, lift), altitude_m))
 
@@ -112,4 +112,4 @@ def read(executive: Executive, names: Sequence[str]) -> Array:
     return np.array([executive.fdm[name] for name in names])
 
 
-__all__ = ["STEP_S", "Bench", "bench", "eas_of", "read"]
+__all__ = ["STEP_S", "ModelBench", "bench", "eas_of", "read"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from airtruth.aircraft.model import LateralProperties, SurfaceProperties
 from airtruth.errors import AircraftError
-from airtruth.simulation.survey.bench import Bench, read
+from airtruth.simulation.survey.bench import ModelBench, read
 from airtruth.simulation.survey.names import ModelNames
 from airtruth.units import DEG
 
@@ -36,7 +36,7 @@ _UNITS: Final = (("-rad", 1.0), ("-deg", DEG), ("-norm", 0.0))
 
 
 @dataclass(frozen=True)
-class Control:
+class SurveyedControl:
     """Knowledge of a control before a model is examined.
 
     Attributes
@@ -44,7 +44,7 @@ class Control:
     name : "elevator", "aileron" or "rudder".
     standard : its command in JSBSim's own flight controls.
     command, surface : names of other commands, and of surfaces (judgement).
-    acceleration : attribute of `airtruth.simulation.simulator.Response` that it changes; a positive surface lowers it.
+    acceleration : attribute of `airtruth.simulation.simulator.SimulatorResponse` that it changes; a positive surface lowers it.
     moment, against : the moment, and the sense of motion for which a model may count its surface positive, in words.
     axis : of the aerodynamics whose surfaces come first; "" for any.
     """
@@ -59,7 +59,7 @@ class Control:
     axis: str = ""
 
 
-ELEVATOR: Final = Control(
+ELEVATOR: Final = SurveyedControl(
     "elevator",
     STANDARD,
     re.compile(r"elev.*cmd|cmd.*elev|pitch.*cmd|stick|stabilator.*cmd", re.IGNORECASE),
@@ -86,7 +86,7 @@ class Found:
     decisions: tuple[str, ...]
 
 
-def elevator_of(bench: Bench, names: ModelNames) -> Found:
+def elevator_of(bench: ModelBench, names: ModelNames) -> Found:
     """Find the command that pitches the aircraft and the surface that moves with it.
 
     Raises
@@ -97,7 +97,7 @@ def elevator_of(bench: Bench, names: ModelNames) -> Found:
     return control_of(bench, names, ELEVATOR)
 
 
-def control_of(bench: Bench, names: ModelNames, control: Control) -> Found:
+def control_of(bench: ModelBench, names: ModelNames, control: SurveyedControl) -> Found:
     """Find the command that moves the aircraft about an axis and the surface that moves with it.
 
     Raises
@@ -137,7 +137,7 @@ def control_of(bench: Bench, names: ModelNames, control: Control) -> Found:
     return Found(found, tuple(notes), tuple(decisions))
 
 
-def effect_of(bench: Bench, command: str, control: Control) -> float:
+def effect_of(bench: ModelBench, command: str, control: SurveyedControl) -> float:
     """Change of a control's angular acceleration by a unit of a command [rad/s2]."""
     low, high = (
         float(getattr(bench.at({command: s * _REACH}).respond(), control.acceleration)) for s in (-1.0, 1.0)
@@ -145,12 +145,14 @@ def effect_of(bench: Bench, command: str, control: Control) -> float:
     return (high - low) / (2.0 * _REACH)
 
 
-def turns(bench: Bench, command: str, control: Control) -> bool:
+def turns(bench: ModelBench, command: str, control: SurveyedControl) -> bool:
     """Whether a command changes the angular acceleration of a control."""
     return abs(effect_of(bench, command, control)) > _TURNS
 
 
-def _surface(bench: Bench, names: ModelNames, command: str, control: Control) -> tuple[str, float, list[str]]:
+def _surface(
+    bench: ModelBench, names: ModelNames, command: str, control: SurveyedControl
+) -> tuple[str, float, list[str]]:
     """Property of the surface, radians per unit, and what the user has to decide."""
     low, high = bench.at({command: -_REACH}), bench.at({command: _REACH})
     catalogue = [line.split(" ")[0] for line in low.fdm.get_property_catalog()]
@@ -187,7 +189,7 @@ def _surface(bench: Bench, names: ModelNames, command: str, control: Control) ->
     )
 
 
-def feedback_rad(bench: Bench) -> float:
+def feedback_rad(bench: ModelBench) -> float:
     """Largest motion of the surface at a held command, by alpha, pitch rate or airspeed [rad]."""
     surface, scale = bench.model.elevator.surface, bench.model.elevator.surface_rad
     states = (
@@ -200,7 +202,7 @@ def feedback_rad(bench: Bench) -> float:
     return max(angles) - min(angles)
 
 
-def switched_over(bench: Bench, names: ModelNames) -> Iterator[tuple[Bench, str]]:
+def switched_over(bench: ModelBench, names: ModelNames) -> Iterator[tuple[ModelBench, str]]:
     """The bench with each switch of the model in its other position, and the setting as NAME = VALUE."""
     start = bench.at()
     manager = start.fdm.get_property_manager()
@@ -210,7 +212,7 @@ def switched_over(bench: Bench, names: ModelNames) -> Iterator[tuple[Bench, str]
             yield bench.known(set={**bench.model.set, name: value}), f"{name} = {value:g}"
 
 
-def without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str], list[str]]:
+def without_feedback(bench: ModelBench, names: ModelNames) -> tuple[ModelBench, list[str], list[str]]:
     """Switch feedback to the elevator off where a property does it, or carry it.
 
     Returns
@@ -233,7 +235,7 @@ def without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str],
     )
 
 
-def integrated(bench: Bench, names: ModelNames) -> list[str]:
+def integrated(bench: ModelBench, names: ModelNames) -> list[str]:
     """Surfaces that go on moving at a held pitch rate and command: a fly-by-wire integrates the error."""
     manager = bench.at().fdm.get_property_manager()
     surfaces = [n for n in names.aerodynamic if n.startswith("fcs/") and "-pos" in n and manager.hasNode(n)]
@@ -241,7 +243,7 @@ def integrated(bench: Bench, names: ModelNames) -> list[str]:
     return [n for n, a, b in zip(surfaces, early, late, strict=True) if abs(b - a) > _INTEGRATES]
 
 
-def lateral_of(bench: Bench) -> tuple[LateralProperties | None, list[str]]:
+def lateral_of(bench: ModelBench) -> tuple[LateralProperties | None, list[str]]:
     """Aileron and rudder, where the symmetric state is not in lateral equilibrium."""
     r = bench.at().respond()
     off = max(abs(r.v_dot_m_s2), abs(r.p_dot_rad_s2), abs(r.r_dot_rad_s2))
@@ -270,8 +272,8 @@ def lateral_of(bench: Bench) -> tuple[LateralProperties | None, list[str]]:
 __all__ = [
     "FEEDBACK_RAD",
     "STANDARD",
-    "Control",
     "Found",
+    "SurveyedControl",
     "control_of",
     "elevator_of",
     "feedback_rad",

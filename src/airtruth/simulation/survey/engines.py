@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from airtruth.aircraft.model import ThrottleProperties
-from airtruth.simulation.survey.bench import Bench
+from airtruth.simulation.survey.bench import ModelBench
 from airtruth.simulation.survey.names import ModelNames
 from airtruth.units import G0, LBF
 
@@ -26,7 +26,7 @@ _MIXTURES: Final = (1.0, 0.87, 0.75, 0.6)
 
 
 @dataclass(frozen=True)
-class Engines:
+class SurveyedEngines:
     """Levers of a model.
 
     Attributes
@@ -35,16 +35,16 @@ class Engines:
     notes, decisions : what was found out, and what the user has to decide.
     """
 
-    bench: Bench
+    bench: ModelBench
     notes: tuple[str, ...]
     decisions: tuple[str, ...]
 
 
-def engines_of(bench: Bench, names: ModelNames) -> Engines:
+def engines_of(bench: ModelBench, names: ModelNames) -> SurveyedEngines:
     """Find the levers that change the thrust; an aircraft without useful thrust glides."""
     count = int(bench.at().fdm.get_propulsion().get_num_engines())
     if count == 0:
-        return Engines(bench, ("no engine: the aircraft glides",), ())
+        return SurveyedEngines(bench, ("no engine: the aircraft glides",), ())
     outside = [n for n in bench.model.declare if "throttle" in n]
     standard = [f"fcs/throttle-cmd-norm{f'[{i}]' if i else ''}" for i in range(count)]
     fixed = {"propulsion/magneto_cmd": 3.0} if "piston_engine" in names.engines else {}
@@ -63,7 +63,9 @@ def engines_of(bench: Bench, names: ModelNames) -> Engines:
     kinds = ", ".join(dict.fromkeys(n.replace("_engine", "") for n in names.engines))
     if full.steady and full.over_weight - idle.over_weight > _USEFUL and full.over_weight < _SOUND:
         how = f"full throttle gives {full.over_weight:.2f} of the weight"
-        return Engines(started, (f"engines: {count} ({kinds}), levers {', '.join(levers)}; {how}",), ())
+        return SurveyedEngines(
+            started, (f"engines: {count} ({kinds}), levers {', '.join(levers)}; {how}",), ()
+        )
     reason = _reason(full, idle, levers)
     if names.has_propeller and "turbine_engine" in names.engines:
         reason += (
@@ -72,7 +74,7 @@ def engines_of(bench: Bench, names: ModelNames) -> Engines:
     off = bench.known(
         throttle=ThrottleProperties(command=()), set={**bench.model.set, **fixed}, engine_start_s=0.0
     )
-    return Engines(
+    return SurveyedEngines(
         off,
         (
             f"engines: {count} ({kinds}) give no useful thrust: {reason}; they stay off and the aircraft glides",
@@ -90,7 +92,7 @@ class _Thrust:
     running: bool
 
 
-def _thrust(bench: Bench, lever: float) -> _Thrust:
+def _thrust(bench: ModelBench, lever: float) -> _Thrust:
     executive = bench.at(throttle=lever)
     fdm = executive.fdm
     each = range(fdm.get_propulsion().get_num_engines())
@@ -99,7 +101,7 @@ def _thrust(bench: Bench, lever: float) -> _Thrust:
     return _Thrust(total / (bench.constants.mass_kg * G0), executive.unsteadiness < _CHATTER, running)
 
 
-def _leaned(bench: Bench) -> Bench:
+def _leaned(bench: ModelBench) -> ModelBench:
     """The mixture with the most thrust at full throttle."""
     benches = []
     for mixture in _MIXTURES:
@@ -122,4 +124,4 @@ def _reason(full: _Thrust, idle: _Thrust, levers: tuple[str, ...]) -> str:
     return f"full throttle gives {full.over_weight:.2g} of the weight"
 
 
-__all__ = ["START_S", "Engines", "engines_of"]
+__all__ = ["START_S", "SurveyedEngines", "engines_of"]

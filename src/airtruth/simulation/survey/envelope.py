@@ -15,7 +15,7 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.simulator import Condition
-from airtruth.simulation.survey.bench import STEP_S, Bench, eas_of
+from airtruth.simulation.survey.bench import STEP_S, ModelBench, eas_of
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG
 
@@ -104,7 +104,7 @@ class FlightTest:
     fault: str
 
 
-def envelope_of(bench: Bench) -> list[Point]:
+def envelope_of(bench: ModelBench) -> list[Point]:
     """Trim from the middle of the speeds to both ends, at one altitude after the other; each end stops after a failure.
 
     A trim starts from its neighbour; without any, from the usual starts.

@@ -7,12 +7,18 @@ from typing import Final
 
 from airtruth.aircraft.model import SurfaceProperties
 from airtruth.errors import AircraftError
-from airtruth.simulation.survey.bench import Bench
-from airtruth.simulation.survey.controls import FEEDBACK_RAD, Control, control_of, switched_over, turns
+from airtruth.simulation.survey.bench import ModelBench
+from airtruth.simulation.survey.controls import (
+    FEEDBACK_RAD,
+    SurveyedControl,
+    control_of,
+    switched_over,
+    turns,
+)
 from airtruth.simulation.survey.names import ModelNames
 from airtruth.units import DEG
 
-AILERON: Final = Control(
+AILERON: Final = SurveyedControl(
     "aileron",
     "fcs/aileron-cmd-norm",
     re.compile(r"ail.*cmd|cmd.*ail|roll.*cmd|elevon.*cmd|stick", re.IGNORECASE),
@@ -23,7 +29,7 @@ AILERON: Final = Control(
     "ROLL",
 )
 """The ailerons, (right - left)/2, each positive with the trailing edge down."""
-RUDDER: Final = Control(
+RUDDER: Final = SurveyedControl(
     "rudder",
     "fcs/rudder-cmd-norm",
     re.compile(r"rud.*cmd|cmd.*rud|yaw.*cmd|pedal", re.IGNORECASE),
@@ -38,7 +44,7 @@ _MOTION: Final = {"p_rad_s": 5.0 * DEG, "r_rad_s": 5.0 * DEG, "beta_rad": 1.0 * 
 """Motions under which a surface has to stand still [rad/s], [rad] (judgement: those of a small manoeuvre)."""
 
 
-def with_lateral_controls(bench: Bench, names: ModelNames) -> tuple[Bench, list[str], list[str]]:
+def with_lateral_controls(bench: ModelBench, names: ModelNames) -> tuple[ModelBench, list[str], list[str]]:
     """Find aileron and rudder, and switch their feedback off where a property does it, or carry it.
 
     Returns
@@ -60,13 +66,13 @@ def with_lateral_controls(bench: Bench, names: ModelNames) -> tuple[Bench, list[
     return bench, notes + more, decisions + to_decide
 
 
-def _controls(bench: Bench) -> list[tuple[Control, SurfaceProperties]]:
+def _controls(bench: ModelBench) -> list[tuple[SurveyedControl, SurfaceProperties]]:
     model = bench.model
     pairs = ((AILERON, model.aileron), (RUDDER, model.rudder))
     return [(control, surface) for control, surface in pairs if surface is not None]
 
 
-def feedback_rad(bench: Bench) -> dict[str, float]:
+def feedback_rad(bench: ModelBench) -> dict[str, float]:
     """Largest motion of each lateral surface at held commands, by roll, yaw, sideslip or bank [rad]."""
     states = [bench.at(), *(bench.at(lateral={name: value}) for name, value in _MOTION.items())]
     result = {}
@@ -76,7 +82,7 @@ def feedback_rad(bench: Bench) -> dict[str, float]:
     return result
 
 
-def _without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str], list[str]]:
+def _without_feedback(bench: ModelBench, names: ModelNames) -> tuple[ModelBench, list[str], list[str]]:
     moves = feedback_rad(bench)
     if max(moves.values()) <= FEEDBACK_RAD:
         return bench, [], []

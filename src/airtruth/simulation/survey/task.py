@@ -17,7 +17,7 @@ from airtruth.errors import AircraftError, AirtruthError
 from airtruth.isolation.protocol import Reply
 from airtruth.simulation.survey import bench as benches
 from airtruth.simulation.survey import controls, engines, envelope
-from airtruth.simulation.survey.bench import Bench
+from airtruth.simulation.survey.bench import ModelBench
 from airtruth.simulation.survey.lateral import with_lateral_controls
 from airtruth.simulation.survey.lateral_flight import flown_laterally
 from airtruth.simulation.survey.names import ModelNames, names_of
@@ -116,7 +116,7 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
     return facts
 
 
-def _loaded(folder: Path, model: JsbsimModel) -> tuple[Bench, list[str], list[str]]:
+def _loaded(folder: Path, model: JsbsimModel) -> tuple[ModelBench, list[str], list[str]]:
     """The model on the bench, with the properties that a simulator around it would have created."""
     declared: dict[str, float] = {}
     while True:
@@ -137,7 +137,7 @@ def _loaded(folder: Path, model: JsbsimModel) -> tuple[Bench, list[str], list[st
     return made, notes, decisions
 
 
-def _retracted(bench: Bench) -> Bench:
+def _retracted(bench: ModelBench) -> ModelBench:
     """The gear up where it can be retracted, and the fuel kept."""
     manager = bench.at().fdm.get_property_manager()
     fixed = {"gear/gear-cmd-norm": 0.0, "propulsion/fuel_freeze": 1.0}

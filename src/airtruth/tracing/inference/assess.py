@@ -12,7 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from airtruth.numerics.discretise import step
 from airtruth.numerics.levenberg_marquardt import minimise
-from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
+from airtruth.numerics.levenberg_marquardt_options import Damping, SolverOptions, Stopping
 from airtruth.numerics.normal_equations import scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of
@@ -28,7 +28,7 @@ from airtruth.tracing.model.steady import linearise_at_reference
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_SEARCH: Final = Options(
+_SEARCH: Final = SolverOptions(
     iterations=30,
     damping=Damping(initial=1e-6, least=1e-6, most=np.inf, poor=0.1, fair=0.1),
     stopping=Stopping(decrease=0.003, decrease_confirm=0.05),

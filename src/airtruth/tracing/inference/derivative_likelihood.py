@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, scatter
 
@@ -26,6 +27,10 @@ Array = NDArray[np.float64]
 _TOLD: Final = 0.05
 """Share of the declared variance that the records have to determine for a direction to be tested [-] (judgement: the
 mode does not move in the others, and the linear theory of a small share is inaccurate)."""
+
+
+DERIVATIVES_MOVED: Final = "the derivatives"
+"""Deviation of the derivatives from those that are declared, or from those that an answer gives."""
 
 
 @dataclass(frozen=True)
@@ -46,21 +51,6 @@ class DerivativeLikelihood:
     cost: float
     declared: Array
     motion: Motion = LONGITUDINAL
-
-
-@dataclass(frozen=True)
-class Contradiction:
-    """Test of the declared derivatives against the records.
-
-    Attributes
-    ----------
-    statistic : chi-square statistic [-]; degrees : its degrees of freedom [-].
-    p_value : probability of a larger statistic where the declaration is right [-].
-    """
-
-    statistic: float
-    degrees: int
-    p_value: float
 
 
 def derivative_likelihood(
@@ -88,7 +78,7 @@ def derivative_likelihood(
     )
 
 
-def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> Contradiction:
+def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> HypothesisTest:
     """Test whether the mode of a fit with the declared prior lies where the declaration lets it lie.
 
     With a true declaration, the mode d_m = C (I d + e) has the covariance C I S I C + C K C: S of the declared
@@ -116,7 +106,8 @@ def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> Contradiction:
     z = vectors.T @ np.linalg.solve(root, mode[tight])
     statistic = float((z[told] ** 2 / values[told]).sum())
     degrees = int(told.sum())
-    return Contradiction(statistic, degrees, float(chi2.sf(statistic, degrees)) if degrees else 1.0)
+    p_value = float(chi2.sf(statistic, degrees)) if degrees else 1.0
+    return HypothesisTest(DERIVATIVES_MOVED, statistic, degrees, p_value)
 
 
 def _split(problem: TraceProblem, fitted: PosteriorFit) -> tuple[Array, Array]:
@@ -134,4 +125,4 @@ def _ratio(problem: TraceProblem, fitted: PosteriorFit) -> Array:
     return np.maximum(inflation(problem, fitted)[own], scatter(problem, fitted)[own])
 
 
-__all__ = ["Contradiction", "DerivativeLikelihood", "contradiction", "derivative_likelihood"]
+__all__ = ["DERIVATIVES_MOVED", "DerivativeLikelihood", "contradiction", "derivative_likelihood"]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.numerics.normal_equations import scaled_inverse
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MarginalSlope, inflation, marginal_slopes
 
@@ -33,20 +34,20 @@ _SEVERAL: Final = 3
 """Least number of records of which one can be told apart [-]: of two that differ, either may be wrong."""
 
 
+DIFFERENCES: Final = "the differences between the records"
+"""Deviation that the test of their agreement names."""
+
+
 @dataclass(frozen=True)
-class Homogeneity:
+class Homogeneity(HypothesisTest):
     """Test of the agreement of records.
 
     Attributes
     ----------
-    statistic, degrees, p_value : chi-square, its degrees of freedom, and its probability.
     outlier : number of the record without which the statistic falls most; None for fewer than three records.
     rest_p_value : the p-value of the other records among themselves; 1 without an outlier.
     """
 
-    statistic: float
-    degrees: int
-    p_value: float
     outlier: int | None
     rest_p_value: float
 
@@ -69,13 +70,12 @@ def homogeneity(problem: TraceProblem, fitted: PosteriorFit) -> Homogeneity:
     statistic, degrees = spread(x, h)
     p_value = float(chi2.sf(statistic / excess, max(degrees, 1)))
     if len(x) < _SEVERAL:
-        return Homogeneity(statistic / excess, degrees, p_value, None, 1.0)
+        return Homogeneity(DIFFERENCES, statistic / excess, degrees, p_value, None, 1.0)
     without = [spread(x[everyone != i], h[everyone != i]) for i in everyone]
     outlier = int(np.argmin([value for value, _ in without]))
     rest, own_degrees = without[outlier]
-    return Homogeneity(
-        statistic / excess, degrees, p_value, outlier, float(chi2.sf(rest / excess, max(own_degrees, 1)))
-    )
+    rest_p_value = float(chi2.sf(rest / excess, max(own_degrees, 1)))
+    return Homogeneity(DIFFERENCES, statistic / excess, degrees, p_value, outlier, rest_p_value)
 
 
 def _at_own(
@@ -124,4 +124,4 @@ def _energy(x: Array, h: Array) -> tuple[float, int]:
     return float(np.sum(along**2 / values[shown])), int(shown.sum())
 
 
-__all__ = ["Homogeneity", "homogeneity", "spread"]
+__all__ = ["DIFFERENCES", "Homogeneity", "homogeneity", "spread"]

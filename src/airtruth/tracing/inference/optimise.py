@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.kept import Kept
-from airtruth.numerics.levenberg_marquardt import Status, minimise
-from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
+from airtruth.numerics.levenberg_marquardt import SolverStatus, minimise
+from airtruth.numerics.levenberg_marquardt_options import Damping, SolverOptions, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
@@ -40,7 +40,7 @@ _FIRST_ITERATIONS: Final = 4
 """Iterations with the levels held, before a search [-]; judgement."""
 _LEAST_DAMPING: Final = 1e-9
 """Damping that is none but for rounding [-]."""
-_SEARCH: Final = Options(
+_SEARCH: Final = SolverOptions(
     iterations=ITERATIONS,
     damping=Damping(initial=1e-3, least=_LEAST_DAMPING, most=1e7, restart=1e-3, poor=5.0, slack=-1e-9),
     stopping=Stopping(
@@ -232,7 +232,7 @@ def fit(
     (at,), (x,), (status,) = solution.at, solution.x, solution.status
     if at is None:
         return None
-    converged = status in (Status.CONVERGED, Status.OUTRUN, Status.STALLED)
+    converged = status in (SolverStatus.CONVERGED, SolverStatus.OUTRUN, SolverStatus.STALLED)
     return PosteriorFit(
         hypothesis=hypothesis,
         point=start.of_vector(x),
@@ -243,7 +243,7 @@ def fit(
         covariance=_covariance(search, at),
         converged=converged,
         shortfall=0.0 if converged else search.shortfall(x, at),
-        outrun=status is Status.OUTRUN,
+        outrun=status is SolverStatus.OUTRUN,
     )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from airtruth.physics.terms import DECLARED
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.sensitivities import Derivatives, Sensitivities
+from airtruth.tracing.inference.sensitivities import InnovationDerivatives, Sensitivities
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.parameters import Layout, ParameterLayout, Parameters
 from airtruth.tracing.model.records import TraceRecord
@@ -192,7 +192,7 @@ def sensitivities_of(
     )
     if slopes is None or not np.isfinite(base.logdet):
         return None
-    differences = Derivatives(base, layout.total)
+    differences = InnovationDerivatives(base, layout.total)
 
     def put_size(k: int) -> None:
         p = hypothesis.parameter(k)

@@ -40,7 +40,7 @@ class Sensitivities:
     more: Array = field(default_factory=lambda: np.zeros(1))
 
 
-class Derivatives:
+class InnovationDerivatives:
     """Collects derivatives of a response."""
 
     def __init__(self, base: Response, parameters: int) -> None:
@@ -81,4 +81,4 @@ class Derivatives:
         return Sensitivities(r, base.logdet, self.t, self.w, base.white, self.more)
 
 
-__all__ = ["Derivatives", "Sensitivities"]
+__all__ = ["InnovationDerivatives", "Sensitivities"]

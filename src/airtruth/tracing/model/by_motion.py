@@ -19,7 +19,7 @@ from airtruth.tracing.model.kernel_input import AnyGrid, AnyPoint, FilterModel
 Array = NDArray[np.float64]
 
 
-class Equations(NamedTuple):
+class MotionEquations(NamedTuple):
     """Equations of one motion; functions but ``settle`` are `airtruth.numerics.compiled.inner`.
 
     Attributes
@@ -49,11 +49,11 @@ class Equations(NamedTuple):
     has_roll_gust: bool = False
 
 
-_OF: Final[dict[type, Equations]] = {}
+_OF: Final[dict[type, MotionEquations]] = {}
 """Type of an aircraft, and type of its inputs along a record -> equations."""
 
 
-def register(aircraft: type, grid: type, equations: Equations) -> None:
+def register(aircraft: type, grid: type, equations: MotionEquations) -> None:
     """State the equations of a motion.
 
     Parameters
@@ -63,12 +63,12 @@ def register(aircraft: type, grid: type, equations: Equations) -> None:
     _OF[aircraft] = _OF[grid] = _OF[equations.point] = equations
 
 
-def equations_of(model: FilterModel) -> Equations:
+def equations_of(model: FilterModel) -> MotionEquations:
     """Equations of a model."""
     return _OF[type(model.aircraft)]
 
 
-def equations_of_grid(grid: tuple[Array, ...]) -> Equations:
+def equations_of_grid(grid: tuple[Array, ...]) -> MotionEquations:
     """Equations of inputs along a record."""
     return _OF[type(grid)]
 
@@ -79,7 +79,7 @@ def coefficients_of(grid: tuple[Array, ...]) -> tuple[str, ...]:
     return tuple(own.point._fields[-own.coefficients :])
 
 
-def _typed(model: Any) -> Equations:
+def _typed(model: Any) -> MotionEquations:
     """Equations by numba's type of a model."""
     return _OF[model.types[model.fields.index("aircraft")].instance_class]
 
@@ -205,7 +205,7 @@ def move_plays(x: Array, at: AnyPoint, model: FilterModel) -> None:
 
 
 __all__ = [
-    "Equations",
+    "MotionEquations",
     "air_at",
     "coefficient_field",
     "coefficients_of",

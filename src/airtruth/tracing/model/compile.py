@@ -71,6 +71,11 @@ class CompiledChange:
         """States of the filter; ``slow``: the sensors have correlated noise."""
         return state_layout(self.effect_states, self.motion, self.lag_s, self.delay_s, slow)
 
+    def undone(self, channel: str, x: Array) -> Array:
+        """Readings of an input without the errors of its sensor [unit of the channel]."""
+        errors = self.inputs.get(channel)
+        return x if errors is None else errors.unscaled(x)
+
 
 def compile_change(change: Change, motion: Motion = LONGITUDINAL) -> CompiledChange:
     """Resolve names to numbers.
@@ -103,7 +108,7 @@ def compile_change(change: Change, motion: Motion = LONGITUDINAL) -> CompiledCha
         elif (sensor.channel, sensor.kind) not in late:
             inputs[sensor.channel] = _with_error(inputs.get(sensor.channel, SensorErrors()), sensor)
     return CompiledChange(
-        surface=tuple(change.surface_path(control.name) for control in motion.controls),
+        surface=tuple(change.surface_path(control) for control in motion.controls),
         effects=_effects(change, first, motion),
         effect_states=first,
         motion=states,

@@ -15,7 +15,7 @@ from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.equations import (
     ALPHA_DOT,
     READING,
-    Signals,
+    AirSignals,
     air_alpha,
     cell,
     effective_elevator,
@@ -79,7 +79,7 @@ class AircraftMoves(NamedTuple):
     lead: Array
 
 
-class _Force(NamedTuple):
+class _ForceSlopes(NamedTuple):
     """X, Z [N] and M [N m] of the tables, their slopes in alpha and qhat, and all three in the thrust."""
 
     x: float
@@ -97,7 +97,7 @@ class _Force(NamedTuple):
 @inner
 def _look_up(
     aircraft: AircraftArrays, engine: Array, alpha: float, surface: float, qhat: float, qbar: float
-) -> _Force:
+) -> _ForceSlopes:
     """Trilinear in the tables; the slopes are those of the cell."""
     values, constant = aircraft.values, aircraft.constant
     i, si = cell(aircraft.alpha_rad, alpha)
@@ -126,7 +126,7 @@ def _look_up(
     )
     by_alpha = 1.0 / (aircraft.alpha_rad[i + 1] - aircraft.alpha_rad[i])
     by_qhat = qbar / (aircraft.qhat[n + 1] - aircraft.qhat[n])
-    return _Force(
+    return _ForceSlopes(
         fx * qbar + (1.0 - si) * constant[i, 0] + si * constant[i + 1, 0],
         fz * qbar + (1.0 - si) * constant[i, 1] + si * constant[i + 1, 1],
         fm * qbar + (1.0 - si) * constant[i, 2] + si * constant[i + 1, 2],
@@ -144,9 +144,9 @@ def _look_up(
 def _all_terms(
     x: Array,
     d_x: Array,
-    f: _Force,
+    f: _ForceSlopes,
     own: float,
-    signals: Signals,
+    signals: AirSignals,
     at: AirPoint,
     model: FilterModel,
     column: Ints,
@@ -158,7 +158,7 @@ def _all_terms(
     loss, weight = half * force / (mass * at.airspeed_m_s), G0 * math.cos(at.theta_rad - x[0]) / at.ground_m_s
     fz = f.z - force * (own + terms(x, signals, effects, False, 0.0)[0])
     first = x[1] + (fz * math.cos(alpha) - f.x * math.sin(alpha)) / (mass * at.ground_m_s) + weight
-    turned = Signals(alpha, signals.elevator, signals.qhat, first * half, signals.qbar)
+    turned = AirSignals(alpha, signals.elevator, signals.qhat, first * half, signals.qbar)
     for turn in range(2):  # terms in alpha' take that of all other forces
         if turn == 1:
             row = work.signal[ALPHA_DOT]
@@ -210,7 +210,7 @@ def _air_slopes(
 
 @inner
 def _coefficient_slopes(
-    signals: Signals, model: FilterModel, moved: AircraftMoves, column: Ints, work: SlopeWork
+    signals: AirSignals, model: FilterModel, moved: AircraftMoves, column: Ints, work: SlopeWork
 ) -> None:
     """Derivatives of CL and Cm beside the tables, without the effects' terms."""
     aircraft, more = model.aircraft, model.aircraft.increments
@@ -239,7 +239,7 @@ def _turning(
     d_x: Array,
     fz: float,
     alpha: float,
-    f: _Force,
+    f: _ForceSlopes,
     at: AirPoint,
     model: FilterModel,
     column: Ints,
@@ -279,7 +279,7 @@ def longitudinal_rate_slopes(
     alpha = air_alpha(x, upward, gusts.level_m_s, at)
     surface = effective_elevator(at.elevator_rad, aircraft)
     tail = gusts.rotary * gusts.level_m_s * (upward - x[_LATE]) / (gusts.rotary_time_s * v)
-    signals = Signals(alpha, surface, (x[1] - tail) * half, 0.0, at.qbar_pa)
+    signals = AirSignals(alpha, surface, (x[1] - tail) * half, 0.0, at.qbar_pa)
     _air_slopes(x, d_x, upward, at, model, moved, column, slope[_LATE], work)
     f = _look_up(aircraft, moved.engine, alpha, surface, signals.qhat, at.qbar_pa)
     _coefficient_slopes(signals, model, moved, column, work)
@@ -344,7 +344,7 @@ def longitudinal_output_slopes(
 
 
 def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
-    """Derivatives of `airtruth.tracing.model.response.pack_aircraft` in the parameters."""
+    """Derivatives of `airtruth.tracing.model.longitudinal_packing.pack_aircraft` in the parameters."""
     entries, row = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
     plant = record.plant
     upward, lead = gust_weights(GUST_1, rolloff)

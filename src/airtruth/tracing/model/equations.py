@@ -12,7 +12,7 @@ q - (w - w_late)/(tau V) with tau = 4 b/(pi V).
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, constants over alpha, increments of the
 derivatives, and the terms of `airtruth.physics.terms`.
 
-Sources: equations of motion, `airtruth.physics.longitudinal`; gusts, MIL-F-8785C, 3.7.1.1 and 3.7.1.2.
+Sources: B. Etkin and L. D. Reid, *Dynamics of Flight*, 3rd ed., 1996, eqs 4.7,1 and 4.7,2; gusts, MIL-F-8785C, 3.7.1.1, 3.7.1.2.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from typing import Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.cells import lower_point
 from airtruth.numerics.compiled import inner, shared
-from airtruth.physics.longitudinal import lower_point
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensors import vane_equation
 from airtruth.physics.terms import numbered_shape
-from airtruth.tracing.model.by_motion import Equations, register
+from airtruth.tracing.model.by_motion import MotionEquations, register
 from airtruth.tracing.model.gust_states import gust_of, gust_rates
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
@@ -57,7 +57,7 @@ shape = cast("Callable[[int, float], float]", inner(numbered_shape))
 _vane = cast("Callable[[float, float, float, float], float]", inner(vane_equation))
 
 
-class Signals(NamedTuple):
+class AirSignals(NamedTuple):
     """Signals of aerodynamic terms, in the order of `airtruth.physics.terms.SIGNALS`.
 
     Attributes
@@ -134,7 +134,7 @@ def signal_of(signals: tuple[float, ...], number: int) -> float:
 
 @inner
 def terms(
-    x: Array, signals: Signals, effects: EffectArrays, in_alpha_dot: bool, feedback: float
+    x: Array, signals: AirSignals, effects: EffectArrays, in_alpha_dot: bool, feedback: float
 ) -> tuple[float, float]:
     """Increments of CL and Cm by the effects' terms in alpha', or by all others.
 
@@ -189,7 +189,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     if model.effects.amplitude.size > 0:
         for turn in range(2):  # terms in alpha' last: they take alpha' with everything else in it
             first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
-            signals = Signals(alpha, surface, qhat, first * half, qbar)
+            signals = AirSignals(alpha, surface, qhat, first * half, qbar)
             added = terms(x, signals, model.effects, turn == 1, half * force * cosine / (mass * v))
             lift, moment = lift + added[0], moment + added[1]
     fz -= force * lift
@@ -200,7 +200,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     out[0] = q + (fz * cosine - fx * sine) / (mass * ground) + weight
     out[1] = fm / aircraft.inertia_kg_m2
     gust_rates(x, GUST_1, v, late, gusts, out)
-    effect_rates(x, Signals(alpha, surface, qhat, out[0] * half, qbar), model, out)
+    effect_rates(x, AirSignals(alpha, surface, qhat, out[0] * half, qbar), model, out)
     return float(fz / mass)
 
 
@@ -257,11 +257,11 @@ def half_time(at: AirPoint, model: FilterModel) -> float:
 
 
 @inner
-def measured(x: Array, alpha: float, at: AirPoint, model: FilterModel) -> Signals:
+def measured(x: Array, alpha: float, at: AirPoint, model: FilterModel) -> AirSignals:
     """The signals that need no acceleration."""
     surface = effective_elevator(at.elevator_rad, model.aircraft)
     qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
-    return Signals(alpha, surface, qhat, 0.0, at.qbar_pa)
+    return AirSignals(alpha, surface, qhat, 0.0, at.qbar_pa)
 
 
 @inner
@@ -359,7 +359,7 @@ def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
 register(
     AircraftArrays,
     GridSignals,
-    Equations(
+    MotionEquations(
         states=len(LONGITUDINAL.states),
         early=len(LONGITUDINAL.outputs) - 1,
         rates=rates,
@@ -379,7 +379,7 @@ __all__ = [
     "PLAY",
     "PLAY_S",
     "READING",
-    "Signals",
+    "AirSignals",
     "add_readings",
     "air_alpha",
     "air_at",

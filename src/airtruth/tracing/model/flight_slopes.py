@@ -31,7 +31,6 @@ from airtruth.tracing.model.sensor_slopes import (
 from airtruth.tracing.model.slopes import output_slopes, rate_slopes
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @inner

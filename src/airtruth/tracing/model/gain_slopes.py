@@ -24,7 +24,7 @@ from airtruth.tracing.model.corners import (
     spread_of,
 )
 from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
-from airtruth.tracing.model.linear_slopes import Linear, linear_slopes
+from airtruth.tracing.model.linear_slopes import LinearSlopes, linear_slopes
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
     add_sensors,
@@ -77,7 +77,7 @@ class Conditions(NamedTuple):
 @allocating
 def _moved_system(
     row: int,
-    linear: Linear,
+    linear: LinearSlopes,
     moves: Moves,
     model: FilterModel,
     a: Array,

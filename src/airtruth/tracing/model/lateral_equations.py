@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.sensors import side_vane_equation
-from airtruth.tracing.model.by_motion import Equations
+from airtruth.tracing.model.by_motion import MotionEquations
 from airtruth.tracing.model.equations import (
     add_readings,
     cell,
@@ -355,7 +355,7 @@ def settle_effects(x: Array, at: LateralPoint, model: FilterModel) -> None:
         x[model.states.effect[k]] = still[model.effects.state_index[k, 1]]
 
 
-EQUATIONS: Final = Equations(
+EQUATIONS: Final = MotionEquations(
     states=STATES,
     early=len(LATERAL.outputs) - 1,
     rates=rates,

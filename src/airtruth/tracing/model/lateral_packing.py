@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +16,11 @@ from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.kernel_input import GustModel
 from airtruth.tracing.model.lateral_equations import EQUATIONS
 from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid
+from airtruth.tracing.model.packing import AirPath, Packing
 from airtruth.tracing.model.parameters import CommonEntries
 from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.records import Signals
+from airtruth.tracing.model.records import fine as on_grid
 
 Array = NDArray[np.float64]
 
@@ -69,4 +74,29 @@ def side_gusts(vertical: GustModel, span_m: float) -> GustModel:
     )
 
 
-__all__ = ["pack_lateral", "side_gusts"]
+def _angle_of_attack(compiled: CompiledChange, s: Signals) -> Array:
+    """Angle of attack at the CG, without the errors of a vane that may be off the plane of symmetry [rad]."""
+    errors = compiled.inputs.get(s.motion.known_signals[0].channel)
+    if errors is None:
+        return s.alpha_rad
+    roll = on_grid(s.y[:, s.motion.output_channels.index(s.motion.controls[0].damped)], s.sub)
+    return errors.unscaled(s.alpha_rad) - roll * errors.y_m / s.airspeed_m_s
+
+
+def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
+    """V'/V of the speed without the gust, from its samples [1/s]."""
+    sampled = ground_m_s[:: s.sub]
+    return on_grid(np.gradient(sampled, s.dt_s, edge_order=2 if sampled.size > 2 else 1) / sampled, s.sub)
+
+
+def _known(s: Signals, compiled: CompiledChange, air: AirPath) -> Sequence[Array]:
+    """Known inputs of `LateralGrid`."""
+    alpha, q = _angle_of_attack(compiled, s), compiled.undone("q_rad_s", s.q_rad_s)
+    v, ground, qbar, theta = air
+    return v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s)
+
+
+PACKING: Final = Packing(LateralGrid, _known, pack_lateral, side_gusts)
+"""Packing of records of the lateral-directional motion."""
+
+__all__ = ["PACKING", "pack_lateral", "side_gusts"]

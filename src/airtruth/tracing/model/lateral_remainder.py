@@ -1,6 +1,6 @@
 """Forces of the declared JSBSim model beyond the sum of its lateral tables, along each record.
 
-The tables of `airtruth.tracing.model.lateral_plant` add up over the signals. The products of two signals that they lack, such as
+The tables of `airtruth.tracing.model.plant` add up over the signals. The products of two signals that they lack, such as
 a rudder whose side force falls with the sideslip, are evaluated in JSBSim at the measured motion:
 
     dCY = (Y - Y_tables)/(q_bar S),    dCl = (L - L_tables)/(q_bar S b),    dCn = (N - N_tables)/(q_bar S b).

@@ -60,8 +60,6 @@ _PHAT: Final = LateralSignals._fields.index("phat")
 """Number of the signal phat [-]."""
 _RHAT: Final = LateralSignals._fields.index("rhat")
 """Number of the signal rhat [-]."""
-_FLOWN: Final = 3
-"""Number of the tables whose signals the motion moves: beta, phat, rhat; those of the surfaces follow [-]."""
 
 
 class LateralMoves(NamedTuple):

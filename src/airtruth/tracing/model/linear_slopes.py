@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Linear(NamedTuple):
+class LinearSlopes(NamedTuple):
     """Linearisation of the motion, and its slopes in the columns behind those of the states.
 
     Attributes
@@ -64,7 +64,7 @@ def _at_end(
 @allocating
 def linear_slopes(
     x: Array, at: AnyPoint, model: FilterModel, aircraft: Any, columns: int, controls: int
-) -> Linear:
+) -> LinearSlopes:
     """Linearisation about a state by the differences of `airtruth.tracing.model.linearise.linearise`, and its slopes.
 
     The half width in a gust depends on the level and the rolloff, and the difference with it where the tables bend.
@@ -81,7 +81,7 @@ def linear_slopes(
     for i in range(motion):
         ends.unit[i, i] = 1.0
     work = slope_work(wide)
-    made = Linear(
+    made = LinearSlopes(
         np.zeros((motion, motion + controls)),
         np.zeros((count, motion + controls)),
         np.zeros((motion, motion + controls, columns)),
@@ -114,7 +114,7 @@ def _difference(j: int, h: float, values: Array, slope: Array, motion: int, out:
 
 
 @allocating
-def _widths(j: int, at: AnyPoint, model: FilterModel, ends: _Ends, made: Linear) -> None:
+def _widths(j: int, at: AnyPoint, model: FilterModel, ends: _Ends, made: LinearSlopes) -> None:
     """Add the slopes by those of the half width in a gust, whose logarithm falls by one with that of the level."""
     first = state_count(model)
     core = first + CORE - GUST_1
@@ -138,4 +138,4 @@ def _widths(j: int, at: AnyPoint, model: FilterModel, ends: _Ends, made: Linear)
         made.d_c[i, j, ROLLOFF] -= by_rolloff * more
 
 
-__all__ = ["Linear", "linear_slopes"]
+__all__ = ["LinearSlopes", "linear_slopes"]

@@ -19,7 +19,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Entry:
+class FreeEntry:
     """One free parameter.
 
     Attributes
@@ -49,7 +49,7 @@ class Entries:
     std : index of an entry with a prior of its own -> standard deviation.
     """
 
-    def __init__(self, entries: Sequence[Entry]) -> None:
+    def __init__(self, entries: Sequence[FreeEntry]) -> None:
         self.names = tuple(entry.name for entry in entries)
         self.size = len(entries)
         self.step = np.array([entry.step for entry in entries])
@@ -106,17 +106,17 @@ class CommonEntries(Entries):
         super().__init__(
             [
                 *(
-                    Entry(d.name, d.unit, force_or_moment[d.row] * angle_or_rate[d.column])
+                    FreeEntry(d.name, d.unit, force_or_moment[d.row] * angle_or_rate[d.column])
                     for d in motion.derivatives
                 ),
-                *(Entry(f"log_noise_{name}", "-", 1e-4) for name in outputs),
-                Entry("rotary", "-", *_PART),
-                Entry("thrust", "-", 1e-3),
-                Entry("rolloff", "-", *_PART),
-                Entry("inertia", "-", 1e-3),
-                Entry("mounting", "-", *_PART),
-                *(Entry(f"colour_{name}", "-", 1e-3, (0.0, 0.95), 0.5) for name in outputs),
-                Entry("log_colour_time", "-", 1e-3, (-1.6, 1.0), 0.7),
+                *(FreeEntry(f"log_noise_{name}", "-", 1e-4) for name in outputs),
+                FreeEntry("rotary", "-", *_PART),
+                FreeEntry("thrust", "-", 1e-3),
+                FreeEntry("rolloff", "-", *_PART),
+                FreeEntry("inertia", "-", 1e-3),
+                FreeEntry("mounting", "-", *_PART),
+                *(FreeEntry(f"colour_{name}", "-", 1e-3, (0.0, 0.95), 0.5) for name in outputs),
+                FreeEntry("log_colour_time", "-", 1e-3, (-1.6, 1.0), 0.7),
             ]
         )
         first, last = outputs[0], outputs[-1]
@@ -150,11 +150,11 @@ class RecordEntries(Entries):
         gust = motion.gusts[0]
         super().__init__(
             [
-                *(Entry(f"{x.name}0", unit := _unit(x.channel), _STEPS[unit]) for x in states),
-                *(Entry(f"{gust}{i}", "-", 1e-3) for i in (1, 2)),
-                *(Entry(f"bias_{y.name}", unit := _unit(y.channel), _STEPS[unit]) for y in outputs),
-                *(Entry(f"{c.name}0", "-", 1e-5 if c.length is None else 1e-6) for c in coefficients),
-                Entry(f"log_sigma_{gust}", "-", 1e-4),
+                *(FreeEntry(f"{x.name}0", unit := _unit(x.channel), _STEPS[unit]) for x in states),
+                *(FreeEntry(f"{gust}{i}", "-", 1e-3) for i in (1, 2)),
+                *(FreeEntry(f"bias_{y.name}", unit := _unit(y.channel), _STEPS[unit]) for y in outputs),
+                *(FreeEntry(f"{c.name}0", "-", 1e-5 if c.length is None else 1e-6) for c in coefficients),
+                FreeEntry(f"log_sigma_{gust}", "-", 1e-4),
             ]
         )
         self.motion_start = slice(0, len(states))
@@ -385,7 +385,7 @@ __all__ = [
     "SHORT_PERIOD",
     "CommonEntries",
     "Entries",
-    "Entry",
+    "FreeEntry",
     "Layout",
     "ParameterLayout",
     "Parameters",

@@ -15,8 +15,8 @@ from airtruth.errors import TrimError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.operating_point import lateral_operating_point, operating_point
-from airtruth.simulation.probe import Grid, forces_at_speeds
-from airtruth.simulation.probe_lateral import LateralGrid
+from airtruth.simulation.probe import ForceGrid, forces_at_speeds
+from airtruth.simulation.probe_lateral import LateralForceGrid
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.model.declared import declared_covariance
@@ -92,7 +92,7 @@ def probed(
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _MARGIN, _LEAST_RATE[None])
     offset = at.controls.elevator_command_rad - at.elevator_rad
     commands = whole(elevator[0] + offset, elevator[1] + offset)
-    grid = Grid(whole(*alpha), commands, rates, np.ones(1))
+    grid = ForceGrid(whole(*alpha), commands, rates, np.ones(1))
     point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, SPEEDS)
     tables, power = point.tables, _engines_of(at, point.at_speeds)
     over_alpha = _lines(at, point.over_alpha)[0]
@@ -139,7 +139,7 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
         lateral_operating_point,
         aircraft,
         at,
-        LateralGrid(_whole(*reach[FLOW]), axes, SPEEDS),
+        LateralForceGrid(_whole(*reach[FLOW]), axes, SPEEDS),
     )
     tables, derivatives = point.tables, point.derivatives.central
     constant = _lines(at, tables.over_alpha)[0]

@@ -11,26 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.kept import Kept
-from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.tracing.model import filter as record_filter
+from airtruth.tracing.model import lateral_packing, longitudinal_packing
 from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
 from airtruth.tracing.model.compile import CompiledChange, compile_change
 from airtruth.tracing.model.kernel_input import (
-    AircraftArrays,
-    AnyAircraft,
     AnyGrid,
     AnyPoint,
     FilterModel,
-    GridSignals,
     GustModel,
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.lateral_input import LateralGrid
-from airtruth.tracing.model.lateral_packing import pack_lateral, side_gusts
+from airtruth.tracing.model.packing import AirPath, Packing
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD, CommonEntries
-from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
 from airtruth.tracing.model.records import fine as on_grid
 from airtruth.tracing.model.schedule import Schedule, schedule
@@ -42,6 +38,11 @@ Array = NDArray[np.float64]
 
 LOST: Final = 1e9
 """Residual of a sample that a lost motion does not reach [unit of the output] (judgement: beyond any that counts)."""
+_PACKINGS: Final[dict[str, Packing]] = {
+    LONGITUDINAL.name: longitudinal_packing.PACKING,
+    LATERAL.name: lateral_packing.PACKING,
+}
+"""Motion -> how its records are packed for the filter."""
 _MOST_SLOW: Final = 0.99
 """Largest share of correlated noise [-]: beyond the search's bound, where the differences need a slope."""
 
@@ -79,6 +80,11 @@ class Response:
     logdet: float
     more_logdet: float = 0.0
     steady: SteadyFilter | None = None
+
+
+def register_packing(motion: Motion, packing: Packing) -> None:
+    """State how records of a further motion are packed."""
+    _PACKINGS[motion.name] = packing
 
 
 @dataclass(frozen=True)
@@ -135,22 +141,18 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> _Inputs:
     s, shift = record.signals.with_lead, record.plant.alpha_shift_rad
     y, theta = s.y, s.theta_rad
     if shift != 0.0:
-        y = y - np.array([shift, 0.0, 0.0])
+        y = y - shift * np.eye(1, y.shape[1])
         theta = theta - shift
     controls = [nodes(fine) for fine in _surfaces(s, compiled)]
-    v, ground = _airspeed(compiled, s), _undo(compiled, "airspeed_m_s", s.ground_m_s)
+    v, ground = _airspeed(compiled, s), compiled.undone("airspeed_m_s", s.ground_m_s)
     qbar, force = 0.5 * s.density_kg_m3 * v * v, _remainder(record, compiled, v.size)
-    grid: AnyGrid
-    if s.motion is LONGITUDINAL:
-        grid = GridSignals._make([*controls, v, ground, qbar, theta, *force])
-    else:
-        alpha, q = _angle_of_attack(compiled, s), _undo(compiled, "q_rad_s", s.q_rad_s)
-        known = (v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s))
-        grid = LateralGrid._make([*controls, *known, *force])
+    packing = _PACKINGS[s.motion.name]
+    known = packing.known(s, compiled, AirPath(v, ground, qbar, theta))
+    grid: AnyGrid = packing.grid._make([*controls, *known, *force])
     speed = float(v.mean())
-    means = {name: float(x.mean()) for name, x in grid._asdict().items()}
-    means |= {"airspeed_m_s": speed, "ground_m_s": speed} | dict.fromkeys(coefficients_of(grid), 0.0)
-    means["qbar_pa"] = 0.5 * float(s.density_kg_m3.mean()) * speed * speed
+    steady = {"airspeed_m_s": speed, "ground_m_s": speed} | dict.fromkeys(coefficients_of(grid), 0.0)
+    steady["qbar_pa"] = 0.5 * float(s.density_kg_m3.mean()) * speed * speed
+    means = {name: steady.get(name, float(x.mean())) for name, x in grid._asdict().items()}
     corner = _corners(s, compiled)
     lead = len(y) - record.samples
     if lead and corner.size:
@@ -164,23 +166,8 @@ def _surfaces(s: Signals, compiled: CompiledChange) -> Iterator[Array]:
     """(fine points,) each control as the air sees it [rad]."""
     step_s = s.dt_s / (s.sub * FINE)
     for number, control in enumerate(s.motion.controls):
-        fine = _undo(compiled, control.channel, s.controls_rad[number])
+        fine = compiled.undone(control.channel, s.controls_rad[number])
         yield through(compiled.surface[number], fine, step_s, float(s.control_std_rad[number]))
-
-
-def _angle_of_attack(compiled: CompiledChange, s: Signals) -> Array:
-    """Angle of attack at the CG, without the errors of a vane that may be off the plane of symmetry [rad]."""
-    errors = compiled.inputs.get(s.motion.known_signals[0].channel)
-    if errors is None:
-        return s.alpha_rad
-    roll = on_grid(s.y[:, s.motion.output_channels.index(s.motion.controls[0].damped)], s.sub)
-    return errors.unscaled(s.alpha_rad) - roll * errors.y_m / s.airspeed_m_s
-
-
-def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
-    """V'/V of the speed without the gust, from its samples [1/s]."""
-    sampled = ground_m_s[:: s.sub]
-    return on_grid(np.gradient(sampled, s.dt_s, edge_order=2 if sampled.size > 2 else 1) / sampled, s.sub)
 
 
 def _corners(s: Signals, compiled: CompiledChange) -> Array:
@@ -212,11 +199,6 @@ def _remainder(record: TraceRecord, compiled: CompiledChange, points: int) -> Ar
     late = [] if others else [term for term in path if term.kind in ("delay", "lag")]
     step = record.signals.dt_s / record.signals.sub
     return np.stack([through(late, row, step) for row in record.remainder])
-
-
-def _undo(compiled: CompiledChange, channel: str, x: Array) -> Array:
-    errors = compiled.inputs.get(channel)
-    return x if errors is None else errors.unscaled(x)
 
 
 def _airspeed(compiled: CompiledChange, s: Signals) -> Array:
@@ -316,7 +298,6 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
     record, compiled = given.record, given.compiled
     constants, entries = record.plant.aircraft.constants, settings.layout.common
     sensors = pack_sensors(compiled, settings, common, per_record, constants.chord_m)
-    aircraft: AnyAircraft
     gusts = GustModel(
         level_m_s=float(np.exp(per_record[settings.layout.per_record.log_gust])),
         length_m=record.gust_length_m,
@@ -324,48 +305,13 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
         rotary=0.5 + float(common[entries.rotary]),
         rotary_time_s=4.0 * constants.span_m / (np.pi * given.reference.airspeed_m_s),
     )
-    if record.plant.motion is LATERAL:
-        aircraft = pack_lateral(record.plant, compiled, common, entries)
-        gusts = side_gusts(gusts, constants.span_m)
-    else:
-        aircraft = pack_aircraft(record.plant, compiled, common)
+    packing = _PACKINGS[record.signals.motion.name]
     return FilterModel(
-        aircraft=aircraft,
-        gusts=gusts,
+        aircraft=packing.aircraft(record.plant, compiled, common, entries),
+        gusts=packing.gusts(gusts, constants.span_m),
         effects=compiled.effects,
         sensors=sensors,
         states=compiled.states(bool((sensors.slow_std > 0.0).any())),
-    )
-
-
-def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> AircraftArrays:
-    """The declared aircraft of a flight condition, with its changes and increments."""
-    c, declared = plant.aircraft.constants, compiled.declared
-    entries, moment = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
-    (table,), trims = plant.tables, plant.trims
-    alpha, control, rate = table.axes
-    inertia = float(common[entries.inertia])
-    increments = common[entries.derivatives].copy()
-    increments[moment] += inertia * (plant.derivatives[moment] + common[moment])
-    return AircraftArrays(
-        area_m2=c.wing_area_m2,
-        chord_m=c.chord_m,
-        mass_kg=c.mass_kg * declared["mass"],
-        inertia_kg_m2=c.inertia_yy_kg_m2 * (declared["inertia"] * (1.0 + inertia)),
-        trim_alpha_rad=plant.trim_alpha_rad,
-        trim_elevator_rad=trims[table.signals[1]],
-        neutral_elevator_rad=float(plant.neutral_rad[0]),
-        effectiveness=declared["elevator"],
-        cg_shift=declared["cg"],
-        thrust_arm_m=declared["thrust_arm"],
-        thrust_n=float(plant.power.thrust[0]),
-        thrust_slope_m2=float(plant.power.thrust[1]),
-        constant=plant.constant + common[entries.thrust] * plant.power.constant,
-        increments=increments,
-        alpha_rad=alpha,
-        elevator_rad=control,
-        qhat=rate,
-        values=table.values,
     )
 
 
@@ -405,8 +351,8 @@ __all__ = [
     "filter_model",
     "kernel_input",
     "moved_past_sensors_m",
-    "pack_aircraft",
     "pack_sensors",
+    "register_packing",
     "respond",
     "respond_to",
 ]

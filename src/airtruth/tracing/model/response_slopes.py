@@ -25,7 +25,7 @@ from airtruth.tracing.model.response import LOST, FilterInputs, Response, kernel
 from airtruth.tracing.model.sensor_slopes import Moved, width_of
 from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.slopes import has_slopes, moves_of, moving
-from airtruth.tracing.model.steady import Condition, common_of, conditions_of, equilibrium, joined
+from airtruth.tracing.model.steady import SteadyCondition, common_of, conditions_of, equilibrium, joined
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -221,7 +221,7 @@ def _noise(kernel: KernelInput, settings: Settings, common: Array, places: _Plac
     return made
 
 
-def _condition(own: Conditions, moves: Moves) -> Condition:
+def _condition(own: Conditions, moves: Moves) -> SteadyCondition:
     """The filter at one flight condition before the steps."""
     corners = None
     if own.spread.size:
@@ -238,7 +238,7 @@ def _condition(own: Conditions, moves: Moves) -> Condition:
             float(own.logdet[0]),
         )
     first = FirstUpdate(own.first.gain[0], own.first.share[0])
-    return Condition(
+    return SteadyCondition(
         own.k_gain[0], first, own.white[0], own.covariance[0], float(own.logdet[0]), corners, own.direct[0]
     )
 

@@ -63,7 +63,7 @@ class SteadyFilter(NamedTuple):
     share: Array
 
 
-class Condition(NamedTuple):
+class SteadyCondition(NamedTuple):
     """The filter at one flight condition; attributes as of `SteadyFilter`, without nodes.
 
     It has no corners where the surface is known.
@@ -101,7 +101,7 @@ def common_of(given: KernelInput, along: Schedule) -> int:
     return away.index(min(away))
 
 
-def joined(given: KernelInput, nodes: Sequence[Condition], along: Schedule) -> SteadyFilter:
+def joined(given: KernelInput, nodes: Sequence[SteadyCondition], along: Schedule) -> SteadyFilter:
     """The filters of the flight conditions as one."""
     common, scale = nodes[0], _unit(given.model)
     if len(nodes) > 1:
@@ -132,7 +132,7 @@ def _unit(model: FilterModel) -> Array:
     return np.eye(model.sensors.scale.size)[None]
 
 
-def _at(given: KernelInput, flow_rad: float, air: AnyPoint) -> Condition | None:
+def _at(given: KernelInput, flow_rad: float, air: AnyPoint) -> SteadyCondition | None:
     """The filter at one flight condition; None where its innovations have no covariance."""
     model = given.model
     n = model.states.size
@@ -149,7 +149,7 @@ def _at(given: KernelInput, flow_rad: float, air: AnyPoint) -> Condition | None:
         spread = np.stack([spread_of(a, column, given.dt_s) for column in columns])
         root = np.asarray(np.linalg.inv(white))
         corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
-    return Condition(k_gain, first, white, covariance, logdet, corners, direct)
+    return SteadyCondition(k_gain, first, white, covariance, logdet, corners, direct)
 
 
 def _shown(lag_s: float, delay_s: float, dt_s: float) -> float:
@@ -193,7 +193,7 @@ def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> Array:
 
 
 __all__ = [
-    "Condition",
+    "SteadyCondition",
     "SteadyFilter",
     "common_of",
     "conditions_of",

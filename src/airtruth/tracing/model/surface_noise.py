@@ -10,12 +10,9 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.settings import Settings
-
-Array = NDArray[np.float64]
 
 _NEGLIGIBLE: Final = 0.1
 """Change of an angular rate in a sample, by the surface's noise, over the noise of the gyro, up to which the surface is exact [-]

@@ -62,7 +62,7 @@ _H: Final = 1e-6
 against the cells of the tables."""
 
 
-class Matrices(NamedTuple):
+class TangentMatrices(NamedTuple):
     """The tangent linear model's matrices.
 
     Attributes
@@ -95,7 +95,7 @@ class Tangent(NamedTuple):
     start : (1 + controls,) flow angle and deflections with which memories are in equilibrium at first [rad].
     """
 
-    matrices: Matrices
+    matrices: TangentMatrices
     path: Path
     steps: int
     h_s: float
@@ -125,7 +125,13 @@ def _copy(x: Array, to: Array) -> None:
 @awaited
 @njit(cache=True, nogil=True, error_model="numpy")
 def _differences(
-    given: KernelInput, steps: Steps, work: Work, path: Path, shown: float, of_grid: Ints, out: Matrices
+    given: KernelInput,
+    steps: Steps,
+    work: Work,
+    path: Path,
+    shown: float,
+    of_grid: Ints,
+    out: TangentMatrices,
 ) -> None:
     """Matrices along a path by one-sided differences; increments of the grid and the outputs are moved and return.
 
@@ -230,7 +236,9 @@ def tangent_of(given: FilterInputs, settings: Settings, common: Array, per_recor
     return Tangent(matrices, path, kernel.sub // 2, h_s, given.lead, kernel.model.sensors, start)
 
 
-def matrices_along(given: KernelInput, path: Path, shown: float, of_grid: Ints, signals: int) -> Matrices:
+def matrices_along(
+    given: KernelInput, path: Path, shown: float, of_grid: Ints, signals: int
+) -> TangentMatrices:
     """Matrices along a path. The differences move coefficients and outputs, which return.
 
     Parameters
@@ -240,7 +248,7 @@ def matrices_along(given: KernelInput, path: Path, shown: float, of_grid: Ints, 
     """
     n, (samples, outputs), forces = given.model.states.size, given.y.shape, len(coefficients_of(given.grid))
     every = (samples - 1) * (given.sub // 2)
-    matrices = Matrices(
+    matrices = TangentMatrices(
         phi=np.zeros((every, n, n)),
         force=np.zeros((every, n, forces, POINTS)),
         c=np.zeros((samples, outputs, n)),

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airtruth.channels import SIGNALS, shown
 from airtruth.charts import Band, Line, Mark, Panel, Rule
@@ -23,8 +22,6 @@ from airtruth.tracing.presentation.curves import angles_of, curve_of
 from airtruth.tracing.presentation.shown_record import ShownRecord
 from airtruth.tracing.presentation.text import unit_of
 from airtruth.units import DEG
-
-Array = NDArray[np.float64]
 
 _AROUND_S: Final = 2.5
 """Width of the shown part of a sensor's channel [s] (judgement: one doublet)."""

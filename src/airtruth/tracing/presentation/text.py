@@ -8,7 +8,6 @@ from typing import Final
 
 from airtruth.effects.increment import STEP
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import OUTPUTS
 from airtruth.table import WIDTH, as_text, significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
@@ -325,8 +324,9 @@ def records_line(answer: TraceAnswer) -> str:
     """Fitted and held-out records, and the model."""
     records = answer.records
     held = ", ".join(records.held_out) or "none"
-    linear = "short-period" if answer.motion is LONGITUDINAL else "lateral-directional"
-    model = "forces probed in JSBSim" if answer.model == "aircraft" else f"linear {linear} model"
+    model = (
+        "forces probed in JSBSim" if answer.model == "aircraft" else f"linear {answer.motion.linear} model"
+    )
     count = len(records.fitted)
     fitted = "1 record fitted, in two parts" if count == 1 else f"{count} records fitted"
     return f"{fitted}, held out: {held}; {model}."

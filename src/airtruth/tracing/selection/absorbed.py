@@ -11,7 +11,7 @@ import numpy as np
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.refit import Refit, with_effect
-from airtruth.tracing.selection.score_test import Score, Table
+from airtruth.tracing.selection.score_test import Score, ScoreTable
 from airtruth.tracing.selection.set_table import SetTable
 
 _USUAL: Final = 0.15
@@ -31,7 +31,7 @@ Starts = Sequence[tuple[Score, tuple[float, ...]]]
 def refit_absorbed(
     sets: SetTable,
     null: PosteriorFit,
-    table: Table,
+    table: ScoreTable,
     fits: Sequence[Refit],
     advance: Advance,
     skip: Collection[str] = (),

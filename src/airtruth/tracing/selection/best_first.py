@@ -88,11 +88,11 @@ def best_first(
     if null is None:
         return None
     held = {e.key for e in effects}
-    own = _Search(sets, hypothesis, tuple(effects), tuple(c for c in causes if c.key not in held))
+    own = _BestFirst(sets, hypothesis, tuple(effects), tuple(c for c in causes if c.key not in held))
     return own.run(null)
 
 
-class _Search:
+class _BestFirst:
     """Fits, predictions and evidence of one search."""
 
     def __init__(

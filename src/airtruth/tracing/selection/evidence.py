@@ -49,7 +49,7 @@ _WRONG_BESIDE: Final = 4
 
 
 @dataclass(frozen=True)
-class Column:
+class EffectColumn:
     """An effect of the filter, or a cause that changes the derivatives alone.
 
     Attributes
@@ -109,7 +109,7 @@ class Column:
         """Whether it widens the prior of the derivatives."""
         return bool(self.freed) or (self.cause is not None and self.cause.prior.shape > _LEAST_SHAPE)
 
-    def may_join(self, other: Column) -> bool:
+    def may_join(self, other: EffectColumn) -> bool:
         """Whether both may be in one set: not two variants of one effect, but delays of two channels."""
         late = [("" if c.effect is None else c.effect.late_signal) for c in (self, other)]
         apart = late[0] != late[1] and "" not in late
@@ -178,7 +178,7 @@ class Quadratic:
     information: Array
     declared: Array
     derivatives: int
-    columns: tuple[Column, ...]
+    columns: tuple[EffectColumn, ...]
     temper: float = 1.0
 
     @property
@@ -337,7 +337,7 @@ class Quadratic:
         return np.asarray((density + inside).sum(axis=1))
 
 
-def _size_prior(c: Column) -> tuple[float, float, float, float, float, float]:
+def _size_prior(c: EffectColumn) -> tuple[float, float, float, float, float, float]:
     """Prior of the size of a column; see `_SizePriors`. What is one-sided has no lower end but the least size."""
     prior = c.prior
     if c.effect is None or prior is not None:
@@ -352,4 +352,4 @@ def _size_prior(c: Column) -> tuple[float, float, float, float, float, float]:
     return (-float(np.log(sides * np.log(end / least))), 1.0, -end if low >= 0.0 else low, high, least, sign)
 
 
-__all__ = ["SINGULAR", "Column", "Declaration", "Quadratic", "Weighed"]
+__all__ = ["SINGULAR", "Declaration", "EffectColumn", "Quadratic", "Weighed"]

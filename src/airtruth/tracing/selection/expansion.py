@@ -24,7 +24,7 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.evidence import Column, Quadratic
+from airtruth.tracing.selection.evidence import EffectColumn, Quadratic
 from airtruth.tracing.selection.score_test import LOCATIONS, directions, perceptible_step
 
 Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ class Expansion:
             common.derivatives.stop,
             (
                 *(
-                    Column(
+                    EffectColumn(
                         e,
                         locations=tuple(where),
                         tried=tried,
@@ -122,7 +122,7 @@ class Expansion:
                     )
                     for e, where, tried in zip(self.effects, self.locations, self.tried, strict=True)
                 ),
-                *(Column(cause=cause) for cause in causes),
+                *(EffectColumn(cause=cause) for cause in causes),
             ),
             temper,
         )

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from airtruth.physics.motion import Motion
+from airtruth.tracing.inference.derivative_likelihood import DERIVATIVES_MOVED
 from airtruth.tracing.model.records import fine
 from airtruth.tracing.model.surface import play
-from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED
 
 Array = NDArray[np.float64]
 

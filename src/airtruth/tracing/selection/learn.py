@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Shape
@@ -35,8 +34,6 @@ from airtruth.tracing.selection.release import CONTRADICTED, explained
 from airtruth.tracing.selection.rounds import NOTHING_DECLARED, Rival, SearchRound, scored_round
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import REMAINS
-
-Array = NDArray[np.float64]
 
 MOST_INCREMENTS: Final = 3
 """Largest number of increments that a trace accepts [-] (judgement: lift, moment and one with memory)."""

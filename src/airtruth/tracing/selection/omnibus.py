@@ -19,12 +19,12 @@ from scipy.stats import chi2
 
 from airtruth.physics.motion import Motion
 from airtruth.tracing.inference.direction import inserted, projected
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.records import TraceRecord, nodes
 from airtruth.tracing.model.response import External, Response, filter_inputs, respond_to
 from airtruth.tracing.model.settings import without
-from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.families import Destinations, Series, View, families
 from airtruth.tracing.selection.spectrum import lines
 
@@ -39,7 +39,7 @@ _QUANTILES: Final = (0.02, 0.98)
 """Quantiles of the predicted flow angle that count as its range [-] (judgement)."""
 
 
-def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> tuple[Anomaly, ...]:
+def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> tuple[HypothesisTest, ...]:
     """Run every test at the optimum of a null hypothesis.
 
     Parameters
@@ -70,7 +70,7 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
     for name, series in built[0].items():
         span = slice(at, at + len(series))
         at += len(series)
-        found.append(Anomaly(name, *chi_square(gradient[span], information[span, span])))
+        found.append(HypothesisTest(name, *chi_square(gradient[span], information[span, span])))
     residuals = [np.where(measured, t.r, 0.0) for t in null.sensitivities]
     periods = [r.signals.dt_s for r in problem.records]
     return (*found, lines(residuals, periods, motion.output_channels))

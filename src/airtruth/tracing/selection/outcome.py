@@ -26,7 +26,7 @@ instead [-] (convention)."""
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SearchOutcome:
     """A finished search.
 
     Attributes
@@ -46,7 +46,7 @@ class Outcome:
         return self.p_value < BEYOND_DOUBT
 
 
-def required_lead(old: Outcome, new: Outcome, lead: float) -> float:
+def required_lead(old: SearchOutcome, new: SearchOutcome, lead: float) -> float:
     """Log-posterior by which a new search has to lead the old one; negative where it may be behind, infinite where it is refused.
 
     A simpler set wins unless the odds against it are strong; a set of as many effects wins without a lead if it alone leaves no
@@ -116,4 +116,4 @@ def _with_declared(sets: SetTable, end: SearchRound, last: SearchRound) -> Searc
     return replace(end, rival=Rival({**(end.rival.sets if end.rival else {}), names: log_weight}))
 
 
-__all__ = ["CLEAN", "STRONG_ODDS", "Outcome", "required_lead", "settled", "total_cost"]
+__all__ = ["CLEAN", "STRONG_ODDS", "SearchOutcome", "required_lead", "settled", "total_cost"]

@@ -16,7 +16,7 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.score_test import Score, Table
+from airtruth.tracing.selection.score_test import Score, ScoreTable
 from airtruth.tracing.selection.set_table import SetTable
 
 LEADING: Final = 8
@@ -81,7 +81,7 @@ class Refit:
 def refit_leaders(
     sets: SetTable,
     null: PosteriorFit,
-    table: Table,
+    table: ScoreTable,
     significant: NDArray[np.bool_],
     advance: Advance,
     wanted: Collection[str] = (),
@@ -140,7 +140,7 @@ def _from_both(sets: SetTable, null: PosteriorFit, r: Refit, advance: Advance) -
 def refit_known(
     sets: SetTable,
     null: PosteriorFit,
-    table: Table,
+    table: ScoreTable,
     fits: Sequence[Refit],
     known: Mapping[str, float],
     advance: Advance,
@@ -173,7 +173,7 @@ def refit_known(
 def _leading(
     problem: TraceProblem,
     null: PosteriorFit,
-    table: Table,
+    table: ScoreTable,
     significant: NDArray[np.bool_],
     wanted: Collection[str],
 ) -> list[int]:
@@ -264,7 +264,7 @@ def freedom_gain(sets: SetTable, null: PosteriorFit, effect: Effect) -> float:
 
 
 def refit_scored(
-    sets: SetTable, null: PosteriorFit, table: Table, number: int, rival: float = np.inf
+    sets: SetTable, null: PosteriorFit, table: ScoreTable, number: int, rival: float = np.inf
 ) -> PosteriorFit | None:
     """The null and one effect with all parameters free, from multiples of the size that the score suggests.
 

@@ -12,12 +12,9 @@ import numpy as np
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.assess import likelihood_at
 from airtruth.tracing.inference.causes import Cause, DeclaredCauses
-from airtruth.tracing.inference.derivative_likelihood import (
-    Contradiction,
-    DerivativeLikelihood,
-    derivative_likelihood,
-)
+from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.selection.explanation import (
     WRONG_BY,
@@ -51,7 +48,7 @@ class Release:
     corrections : see `DeclaredCauses`.
     """
 
-    test: Contradiction
+    test: HypothesisTest
     fit: PosteriorFit
     sets: tuple[CauseSet, ...]
     strain: float
@@ -71,7 +68,7 @@ def released(hypothesis: Hypothesis, problem: TraceProblem) -> Hypothesis:
 
 
 def release(
-    sets: SetTable, null: PosteriorFit, declared: DeclaredCauses, test: Contradiction
+    sets: SetTable, null: PosteriorFit, declared: DeclaredCauses, test: HypothesisTest
 ) -> Release | None:
     """Where a test contradicts the declaration, fit without it and explain the shifts.
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.causes import DeclaredCauses
-from airtruth.tracing.inference.derivative_likelihood import Contradiction, contradiction
+from airtruth.tracing.inference.derivative_likelihood import contradiction
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import Profile, best_location, location_index
@@ -22,7 +23,6 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.absorbed import refit_absorbed
 from airtruth.tracing.selection.acceptance import Candidate, has_converged
-from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import anomalies
@@ -37,7 +37,7 @@ from airtruth.tracing.selection.refit import (
 )
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import Release, explained, release
-from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.score_test import ScoreTable
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import (
     BEYOND_DOUBT,
@@ -138,12 +138,12 @@ class SearchRound:
     null: PosteriorFit
     gls: PosteriorFit
     whitener: Whitener
-    table: Table
-    omnibus: tuple[Anomaly, ...]
+    table: ScoreTable
+    omnibus: tuple[HypothesisTest, ...]
     adjusted: Array
     candidates: tuple[Candidate, ...]
     tied: tuple[Candidate, ...]
-    declared_test: Contradiction
+    declared_test: HypothesisTest
     profile: Profile | None = None
     release: Release | None = None
     sets: tuple[CauseSet, ...] = ()
@@ -173,13 +173,13 @@ class SearchRound:
         return not self.tied or self.release_gain > self.tied[0].gain + _RELEASE_LEADS
 
     @property
-    def anomaly(self) -> Anomaly:
+    def anomaly(self) -> HypothesisTest:
         """The strongest evidence of a missing effect, a score or an omnibus test; p-value by Bonferroni's rule."""
         return strongest(self.omnibus, self.table, self.adjusted)
 
     def p_value_of(self, where: str) -> float:
         """P-value of an omnibus test, 1 where it was not made [-]."""
-        return next((a.p_value for a in self.omnibus if a.where == where), 1.0)
+        return next((a.p_value for a in self.omnibus if a.null == where), 1.0)
 
 
 def search_round(

@@ -65,7 +65,7 @@ class Score:
 
 
 @dataclass(frozen=True)
-class Table:
+class ScoreTable:
     """Scores of all effects.
 
     Attributes
@@ -104,7 +104,7 @@ def directions(effect: Effect, null: PosteriorFit, problem: TraceProblem) -> lis
 
 def table(
     null: PosteriorFit, problem: TraceProblem, effects: Sequence[Effect], whitener: Whitener, seed: int
-) -> Table:
+) -> ScoreTable:
     """Scores of the effects at the optimum of a null hypothesis.
 
     Parameters
@@ -135,7 +135,7 @@ def table(
         white.append(float(np.max(z)))
         here, sure = score.index, white_information[score.index, score.index]
         white_sizes.append(float(-white_gradient[here] / sure) if sure > 0.0 else score.size)
-    return Table(tuple(scores), information, tuple(white), tuple(white_sizes))
+    return ScoreTable(tuple(scores), information, tuple(white), tuple(white_sizes))
 
 
 def _score(
@@ -230,4 +230,4 @@ def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.r
     return float((np.count_nonzero(largest >= top) + 1) / (_DRAWS + 1))
 
 
-__all__ = ["Score", "Table", "directions", "holm", "perceptible_step", "table"]
+__all__ = ["Score", "ScoreTable", "directions", "holm", "perceptible_step", "table"]

@@ -18,7 +18,14 @@ from airtruth.tracing.selection.acceptance import Candidate, is_plausible, predi
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import events
-from airtruth.tracing.selection.outcome import CLEAN, STRONG_ODDS, Outcome, required_lead, settled, total_cost
+from airtruth.tracing.selection.outcome import (
+    CLEAN,
+    STRONG_ODDS,
+    SearchOutcome,
+    required_lead,
+    settled,
+    total_cost,
+)
 from airtruth.tracing.selection.refit import redundant_effect
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import Release
@@ -140,10 +147,10 @@ class _Search:
             rounds = (*rounds[:-1], replace(rounds[-1], exchanged=self.sets.exchanges(last)))
         return rounds
 
-    def _outcome(self, last: SearchRound) -> Outcome:
+    def _outcome(self, last: SearchRound) -> SearchOutcome:
         accepted = {e.key for e in last.null.hypothesis.effects}
         agrees = not self.causes or any(cause <= accepted for cause in self.causes)
-        return Outcome(len(_effects_of(last)), last.anomaly.p_value, agrees)
+        return SearchOutcome(len(_effects_of(last)), last.anomaly.p_value, agrees)
 
     def _with_absorbed(
         self, first: RoundStart, rounds: tuple[SearchRound, ...], beside: bool

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from airtruth.tracing.selection.anomaly import Anomaly
-from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
+from airtruth.tracing.selection.score_test import ScoreTable
 
 LEVEL: Final = 0.05
 """Significance level of the scores in the first round, after Holm's correction [-] (convention)."""
@@ -47,13 +47,15 @@ def significant_gain(candidates: int, level: float = FAMILY_LEVEL) -> float:
     return float(chi2.isf(level / max(candidates, 1), 1))
 
 
-def later_gain(candidates: int, anomaly: Anomaly) -> float:
+def later_gain(candidates: int, anomaly: HypothesisTest) -> float:
     """Gain in 2 log L from which an effect is significant beside others that leave an anomaly."""
     misfit = anomaly.p_value < BEYOND_DOUBT
     return significant_gain(candidates, MISFIT_FAMILY_LEVEL if misfit else LATER_FAMILY_LEVEL)
 
 
-def strongest(omnibus: Sequence[Anomaly], table: Table, adjusted: NDArray[np.float64]) -> Anomaly:
+def strongest(
+    omnibus: Sequence[HypothesisTest], table: ScoreTable, adjusted: NDArray[np.float64]
+) -> HypothesisTest:
     """The strongest evidence of a missing effect, a score or an omnibus test; p-value by Bonferroni's rule.
 
     Parameters
@@ -64,7 +66,7 @@ def strongest(omnibus: Sequence[Anomaly], table: Table, adjusted: NDArray[np.flo
     if table.scores:
         best = min(range(len(adjusted)), key=lambda i: (adjusted[i], -abs(table.scores[i].z)))
         s = table.scores[best]
-        seen.append(Anomaly(s.effect.key, s.z**2, 1, float(adjusted[best])))
+        seen.append(HypothesisTest(s.effect.key, s.z**2, 1, float(adjusted[best])))
     # among p-values that underflow to zero, the chi-square farthest out by R. A. Fisher's sqrt(2 x)
     least = min(seen, key=lambda a: (a.p_value, np.sqrt(2.0 * a.degrees) - np.sqrt(2.0 * a.statistic)))
     return replace(least, p_value=min(1.0, len(seen) * least.p_value))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from airtruth.tracing.selection.anomaly import Anomaly
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ _LOWEST_HZ: Final = 1.0
 """Lowest frequency of the spectral test [Hz]; gust level, biases and correlated noise are free below (judgement)."""
 
 
-def lines(residuals: Sequence[Array], dt_s: Sequence[float], channels: Sequence[str]) -> Anomaly:
+def lines(residuals: Sequence[Array], dt_s: Sequence[float], channels: Sequence[str]) -> HypothesisTest:
     """Test the power of the innovations in bands: a lightly damped mode raises it in one.
 
     Each channel is whitened by an autoregression of first order, which absorbs the colour of a sensor's noise. A
@@ -50,14 +50,14 @@ def lines(residuals: Sequence[Array], dt_s: Sequence[float], channels: Sequence[
             degrees[b] += 2.0 * np.count_nonzero(inside)
     seen = degrees > 0.0
     if not seen.any():
-        return Anomaly(channels[0], 0.0, 1, 1.0)
+        return HypothesisTest(channels[0], 0.0, 1, 1.0)
     p = np.ones_like(power)
     p[seen] = chi2.sf(power[seen], degrees[seen][:, None])
     excess = np.sqrt(2.0 * power) - np.sqrt(2.0 * degrees)[:, None]
     # among p-values that underflow to zero, the band with the most power
     b, channel = divmod(int(np.lexsort((-excess.ravel(), p.ravel()))[0]), p.shape[1])
     where = f"{channels[channel]} at {edges[b]:.1f} to {edges[b + 1]:.1f} Hz"
-    return Anomaly(
+    return HypothesisTest(
         where,
         float(power[b, channel]),
         int(degrees[b]),

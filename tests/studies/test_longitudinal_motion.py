@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import expm
 
 from airtruth.physics import short_period
-from airtruth.physics.longitudinal import ForceTables, Longitudinal, auxiliary, simulate
+from airtruth.simulation.probe import ForceTables
 from airtruth.units import G0
+from studies.longitudinal_motion import Longitudinal, auxiliary, simulate
 
 MASS, INERTIA, AIRSPEED = 26.195, 6.314, 42.85  # GTM, facts of aircraft/gtm
 # M. Brunot's paper, table 1: true values.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from airtruth import style
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.reporting.campaign import Campaign
+from airtruth.reporting.campaign import FlownCampaign
 from airtruth.reporting.paper.published import SYMBOLS, PublishedTable
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ sample beyond the quartiles."""
 
 
 def estimates(
-    campaign: Campaign,
+    campaign: FlownCampaign,
     methods: Sequence[str] | None = None,
     printed: Sequence[PublishedTable] = (),
     title: str = "",

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from airtruth import style
 from airtruth.channels import shown
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.reporting.loop import BARS, LoopTable, bias_pct
 from airtruth.reporting.paper.published import SYMBOLS
 from airtruth.tracing import TraceResult
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.presentation.shown_record import ShownRecord, shown_record
+from studies.loop_report import BARS, LoopTable, bias_pct
 
 Array = NDArray[np.float64]
 

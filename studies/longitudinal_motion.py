@@ -20,27 +20,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.aircraft import Aircraft
+from airtruth.numerics.cells import lower_point
 from airtruth.physics.short_period import Scale
+from airtruth.simulation.probe import ForceGrid, ForceTables, probe
+from airtruth.simulation.simulator import Executive
+from airtruth.simulation.trim import Trim
+from airtruth.units import FT
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ForceTables:
-    """X, Z, M over four increasing axes; linear between points, constant outside.
-
-    Attributes
-    ----------
-    airspeed_m_s, alpha_rad, elevator_rad, q_rad_s : axes (nv,) [m/s], (na,) [rad], (ne,) [rad], (nq,)
-        [rad/s]; at least two points each.
-    values : (nv, na, ne, nq, 3) forces X, Z along body x, z [N], moment M about the CG [N m].
-    """
-
-    airspeed_m_s: Array
-    alpha_rad: Array
-    elevator_rad: Array
-    q_rad_s: Array
-    values: Array
 
 
 @dataclass(frozen=True)
@@ -67,8 +55,24 @@ class Longitudinal:
     drift: float = 1.0
 
 
+def model_of(aircraft: Aircraft, trim: Trim, grid: ForceGrid | None = None) -> Longitudinal:
+    """The aircraft in the vertical plane, from its forces in JSBSim; see `airtruth.simulation.probe.probe`."""
+    executive = Executive(aircraft, 1.0 / 200.0)
+    executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+    return Longitudinal(
+        tables=probe(aircraft, trim, grid),
+        mass_kg=trim.mass_kg,
+        inertia_kg_m2=aircraft.constants.inertia_yy_kg_m2,
+        gravity_m_s2=executive.node("accelerations/gravity-ft_sec2").get_double_value() * FT,
+        airspeed_m_s=trim.airspeed_m_s,
+        alpha_rad=trim.alpha_rad,
+        elevator_rad=trim.elevator_rad,
+        gamma_rad=trim.condition.gamma_rad,
+    )
+
+
 @dataclass(frozen=True)
-class Motion:
+class SimulatedMotion:
     """Response of runs, (runs, samples) each.
 
     Attributes
@@ -83,19 +87,6 @@ class Motion:
     gamma_rad: Array
     ax_m_s2: Array
     az_m_s2: Array
-
-
-@njit(cache=True, nogil=True)
-def lower_point(axis: Array, x: float) -> int:
-    """Lower point of the cell of an increasing axis that holds x; the end cells reach beyond the ends."""
-    low, high = 0, axis.size - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if axis[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    return low
 
 
 @njit(cache=True)
@@ -219,7 +210,9 @@ def _integrate(
                 state[i] += dt_s / 6.0 * slope
 
 
-def simulate(model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array | None = None) -> Motion:
+def simulate(
+    model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array | None = None
+) -> SimulatedMotion:
     """Motion from the steady state, by the classical Runge-Kutta method of fourth order.
 
     Parameters
@@ -254,7 +247,7 @@ def simulate(model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array
     out = np.empty((runs, 6, samples))
     axes = (t.airspeed_m_s, t.alpha_rad, t.elevator_rad, t.q_rad_s)
     _integrate(elevator, trim, added, dt_s, *axes, t.values, out)
-    return Motion(*(np.ascontiguousarray(out[:, i]) for i in range(6)))
+    return SimulatedMotion(*(np.ascontiguousarray(out[:, i]) for i in range(6)))
 
 
 def auxiliary(

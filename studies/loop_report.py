@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from airtruth.errors import LogError, counted
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.reporting.campaign import Campaign
+from airtruth.reporting.campaign import FlownCampaign
 from airtruth.reporting.paper.layout import STANDARD_ERROR
 from airtruth.reporting.paper.published import DECIMALS, SYMBOLS
 from airtruth.reporting.paper.tables import statistics_of
@@ -50,7 +50,7 @@ LONG_COLUMNS: Final = (
 
 
 @dataclass(frozen=True)
-class Bar:
+class Requirement:
     """A requirement on one derivative of one method: its bias before and after [%], and whether the bar is met."""
 
     before_pct: float
@@ -73,13 +73,13 @@ class LoopTable:
 
     name: str
     title: str
-    campaign: Campaign
+    campaign: FlownCampaign
     truth: Array
     statistics: dict[str, tuple[MethodStatistics, MethodStatistics]]
     notes: tuple[str, ...]
 
 
-def without(campaign: Campaign, run_ids: Collection[str]) -> Campaign:
+def without(campaign: FlownCampaign, run_ids: Collection[str]) -> FlownCampaign:
     """Return the campaign without the runs in which the effects were traced."""
     kept = np.array([run_id not in run_ids for run_id in campaign.run_ids])
     return replace(
@@ -102,7 +102,7 @@ def without(campaign: Campaign, run_ids: Collection[str]) -> Campaign:
     )
 
 
-def evaluate(campaign: Campaign, name: str, title: str, notes: Sequence[str] = ()) -> LoopTable:
+def evaluate(campaign: FlownCampaign, name: str, title: str, notes: Sequence[str] = ()) -> LoopTable:
     """Return the statistics of every method with estimates both without and with effects.
 
     Raises
@@ -132,16 +132,16 @@ def bias_pct(s: MethodStatistics, truth: Array) -> tuple[Array, Array]:
     return sign * (s.mean.value[six] - truth) / size, s.mean.se[six] / size
 
 
-def bars(table: LoopTable) -> dict[str, dict[str, Bar]]:
+def bars(table: LoopTable) -> dict[str, dict[str, Requirement]]:
     """Return method -> derivative of `BARS` -> requirement."""
-    result: dict[str, dict[str, Bar]] = {}
+    result: dict[str, dict[str, Requirement]] = {}
     for method, pair in table.statistics.items():
         own = result.setdefault(method, {})
         (before, before_se), (after, after_se) = (bias_pct(s, table.truth) for s in pair)
         for name, limit in BARS.items():
             j = LONGITUDINAL.parameters.index(name)
             most = abs(before[j]) + 2.0 * math.hypot(before_se[j], after_se[j]) if limit is None else limit
-            own[name] = Bar(float(before[j]), float(after[j]), bool(abs(after[j]) <= most))
+            own[name] = Requirement(float(before[j]), float(after[j]), bool(abs(after[j]) <= most))
     return result
 
 
@@ -270,8 +270,8 @@ def write_loop(table: LoopTable, out: Path) -> tuple[str, tuple[Path, ...]]:
 __all__ = [
     "BARS",
     "WITH_EFFECTS",
-    "Bar",
     "LoopTable",
+    "Requirement",
     "bars",
     "bias_pct",
     "evaluate",

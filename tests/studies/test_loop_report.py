@@ -8,8 +8,7 @@ import pytest
 
 from airtruth.errors import LogError
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.reporting import loop, loop_figures
-from airtruth.reporting.campaign import Campaign, MethodEstimates
+from airtruth.reporting.campaign import FlownCampaign, MethodEstimates
 from airtruth.tracing.accepted import IncrementTable
 from airtruth.tracing.answer import (
     AcceptedEffect,
@@ -19,8 +18,10 @@ from airtruth.tracing.answer import (
     RecordNames,
     TraceAnswer,
 )
-from airtruth.tracing.presentation import overview as traces
 from airtruth.tracing.stage_errors import BySet, Errors, Rms
+from studies import loop_figures
+from studies import loop_report as loop
+from studies import traces_overview as traces
 
 RUNS = 40
 TRUTH = np.array([4.79, 31.0, 0.48, -1.785, -41.4, -1.787, 9.0, 0.4])
@@ -50,7 +51,7 @@ def campaign(tmp_path):
     for method, (before, after) in BIAS.items():
         found[method] = estimates(before)
         found[method + loop.WITH_EFFECTS] = estimates(after)
-    return Campaign(
+    return FlownCampaign(
         folder=tmp_path,
         name="light-fit",
         title="made up",
@@ -103,7 +104,7 @@ def test_formats_say_the_same(campaign, tmp_path):
 
 def test_a_campaign_without_effects_is_refused(campaign):
     alone = {m: e for m, e in campaign.estimates.items() if not m.endswith(loop.WITH_EFFECTS)}
-    bare = Campaign(**{**vars(campaign), "estimates": alone})
+    bare = FlownCampaign(**{**vars(campaign), "estimates": alone})
     with pytest.raises(LogError, match="effects"):
         loop.evaluate(bare, "loop", "The loop")
 

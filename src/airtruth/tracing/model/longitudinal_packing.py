@@ -1,0 +1,56 @@
+"""The declared aircraft of the pitch plane as the compiled filter reads it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.tracing.model.compile import CompiledChange
+from airtruth.tracing.model.kernel_input import AircraftArrays, GridSignals
+from airtruth.tracing.model.packing import Packing
+from airtruth.tracing.model.parameters import SHORT_PERIOD, CommonEntries
+from airtruth.tracing.model.plant import Plant
+
+Array = NDArray[np.float64]
+
+
+def pack_aircraft(
+    plant: Plant, compiled: CompiledChange, common: Array, entries: CommonEntries = SHORT_PERIOD.common
+) -> AircraftArrays:
+    """The declared aircraft of a flight condition, with its changes and increments."""
+    c, declared = plant.aircraft.constants, compiled.declared
+    moment = LONGITUDINAL.row("Cm")
+    (table,), trims = plant.tables, plant.trims
+    alpha, control, rate = table.axes
+    inertia = float(common[entries.inertia])
+    increments = common[entries.derivatives].copy()
+    increments[moment] += inertia * (plant.derivatives[moment] + common[moment])
+    return AircraftArrays(
+        area_m2=c.wing_area_m2,
+        chord_m=c.chord_m,
+        mass_kg=c.mass_kg * declared["mass"],
+        inertia_kg_m2=c.inertia_yy_kg_m2 * (declared["inertia"] * (1.0 + inertia)),
+        trim_alpha_rad=plant.trim_alpha_rad,
+        trim_elevator_rad=trims[table.signals[1]],
+        neutral_elevator_rad=float(plant.neutral_rad[0]),
+        effectiveness=declared["elevator"],
+        cg_shift=declared["cg"],
+        thrust_arm_m=declared["thrust_arm"],
+        thrust_n=float(plant.power.thrust[0]),
+        thrust_slope_m2=float(plant.power.thrust[1]),
+        constant=plant.constant + common[entries.thrust] * plant.power.constant,
+        increments=increments,
+        alpha_rad=alpha,
+        elevator_rad=control,
+        qhat=rate,
+        values=table.values,
+    )
+
+
+PACKING: Final = Packing(GridSignals, lambda s, compiled, air: air, pack_aircraft)
+"""Packing of records of the pitch plane."""
+
+__all__ = ["PACKING", "pack_aircraft"]
