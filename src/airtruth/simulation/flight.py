@@ -202,8 +202,8 @@ class Flight:
                     if not run():
                         raise _ended(fdm)
             else:
-                for values in steps[first : first + every]:
-                    write(*values)
+                for present in steps[first : first + every]:
+                    write(*present)
                     if not run():
                         raise _ended(fdm)
             extend([get() for get in gets])
