@@ -115,8 +115,7 @@ def function(coefficient: str) -> str:
         <ifthen>
           <property>aero/six-axes</property>
           <product>
-            <property>aero/qbar-psf</property>
-            <property>metrics/Sw-sqft</property>
+            <property>aero/qbar-area</property>
 {reference}            <sum>
 {"".join(tables)}            </sum>
           </product>
@@ -133,8 +132,10 @@ def _table(name: str, points: list[Array], values: Array, variables: tuple[str, 
     if len(points) == 3:
         sheets = [(f' breakPoint="{p:g}"', values[:, :, k]) for k, p in enumerate(points[2])]
     for end, sheet in sheets:
-        lines += [f"<tableData{end}>", "        " + "".join(f"{p:13g}" for p in points[1])]
-        rows = zip(points[0], sheet, strict=True)
+        # JSBSim looks nothing up in a sheet of one row, and is the faster for it
+        rows, columns = (points[0], points[1]) if sheet.any() else (points[0][:1], points[1][[0, -1]])
+        lines += [f"<tableData{end}>", "        " + "".join(f"{p:13g}" for p in columns)]
+        rows = zip(rows, sheet[: len(rows), : len(columns)], strict=True)
         lines += [f"{a:8g}" + "".join(f" {round(v, 9) + 0.0:12.8g}" for v in row) for a, row in rows]
         lines.append("</tableData>")
     body = "".join(f"                {line}\n" for line in lines)

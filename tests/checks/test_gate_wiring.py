@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faults import FAULTS
+from lateral_faults import LATERAL_FAULTS
+from test_gate_lateral import all_axes
 from tiers import sampled
 
 import airtruth as at
@@ -17,23 +19,18 @@ from airtruth import cli
 from airtruth.errors import LogError
 from airtruth.logs.store import read_log, write_log
 from airtruth.tracing import run as tracing
+from validation.lateral_truth import log_of, record_pair
 
 ROOT = Path(__file__).resolve().parents[2]
-MAPPING = "".join(
-    f'[channels.{name}]\ncolumn = "{name}"\nunit = "{unit}"\n'
-    for name, unit in {
-        "airspeed_m_s": "m_s",
-        "alpha_rad": "rad",
-        "theta_rad": "rad",
-        "q_rad_s": "rad_s",
-        "ax_m_s2": "m_s2",
-        "az_m_s2": "m_s2",
-        "elevator_rad": "rad",
-        "elevator_command_rad": "rad",
-        "altitude_m": "m",
-        "density_kg_m3": "kg_m3",
-    }.items()
-)
+UNITS = {
+    "alt": "m",
+    "air": "m_s",
+    "den": "kg_m3",
+    "ax_": "m_s2",
+    "ay_": "m_s2",
+    "az_": "m_s2",
+} | dict.fromkeys(("p_r", "q_r", "r_r"), "rad_s")
+"""First three letters of a channel -> its unit in a mapping; rad without an entry."""
 TIMES = '[time]\ncolumn = "t_s"\nrun = "run_id"\n'
 NAMED = ["az sign", "alpha sign", "q sign", "elevator sign", "alpha and q", "alpha in deg", "az partly zero"]
 """Faults of the three reviews that a verb once answered with numbers."""
@@ -48,11 +45,21 @@ def log():
 def stored(log, tmp_path):
     def write(name):
         path = tmp_path / "bad.parquet"
-        write_log(path, FAULTS[name](log), dtype="float64")
-        (tmp_path / "map.toml").write_text(TIMES + MAPPING)
-        return path
+        return written(FAULTS[name](log), path)
 
     return write
+
+
+def written(log, path):
+    """The log at a path, and a mapping of its channels beside it."""
+    write_log(path, log, dtype="float64")
+    rows = (
+        f'[channels.{n}]\ncolumn = "{n}"\nunit = "{UNITS.get(n[:3], "rad")}"\n'
+        for n in log.channels
+        if n != "throttle"
+    )
+    path.with_name("map.toml").write_text(TIMES + "".join(rows))
+    return path
 
 
 @pytest.fixture
@@ -76,23 +83,42 @@ def arguments(verb, path):
         "identify": ("identify", path, "--aircraft", "gtm", "--method", "ls", "--quiet"),
         "check": ("check", path, "--aircraft", "gtm"),
         "trace": ("trace", path, "--aircraft", "gtm", "--out", folder / "out", "--quiet"),
+        "loop": ("loop", path, "--aircraft", "gtm", "--out", folder / "out", "--quiet"),
         "import": ("import", path, "--mapping", folder / "map.toml", "--out", folder / "out.parquet"),
     }[verb]
 
 
-VERBS = ("identify", "check", "trace", "import")
+VERBS = ("identify", "check", "trace", "loop", "import")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("verb", "name"), sampled(product(VERBS, NAMED), 3))
 def test_every_verb_refuses_and_names_the_channel(verb, name, stored, command, monkeypatch):
+    refused(verb, stored(name), FAULTS[name], command, monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def turning():
+    return log_of(*(all_axes(f) for f in record_pair()))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("verb", "name"), sampled(product(VERBS, LATERAL_FAULTS), 40))
+def test_every_verb_refuses_a_lateral_fault(verb, name, turning, command, monkeypatch, tmp_path):
+    path = written(LATERAL_FAULTS[name](turning), tmp_path / "bad.parquet")
+    refused(verb, path, LATERAL_FAULTS[name], command, monkeypatch)
+
+
+def refused(verb, path, fault, command, monkeypatch):
+    """The command ends with one error that names a channel of the fault, and writes nothing."""
     monkeypatch.setattr(tracing, "prepare", lambda *a: pytest.fail("went on behind the gate"))
-    code, out, err = command(*arguments(verb, stored(name)))
+    code, out, err = command(*arguments(verb, path))
     assert code == 2, (out, err)
     assert "contradicts physics" in err
     assert "--force" in err
-    assert any(channel in err for channel in FAULTS[name].channels)
-    assert not (stored(name).parent / "out.parquet").exists()
+    assert any(channel in err for channel in fault.channels)
+    assert not path.with_name("out.parquet").exists()
+    assert not path.with_name("out").exists()
 
 
 @pytest.mark.slow

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,9 @@ from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
 Array = NDArray[np.float64]
+
+_SELDOM: Final = 0.1
+"""Share of the steps at which a property changes up to which it is written at those alone [-] (judgement: it costs no bits)."""
 
 
 @dataclass(frozen=True)
@@ -174,31 +179,35 @@ class Flight:
         first = controls.elevator_command_rad + float(inputs.command_rad[0])
         executive.hold(replace(controls, elevator_command_rad=first))
         self._engage(inputs)
-        for setter, first_value in zip(setters[1:], (values[0] for values in series[1:]), strict=True):
-            setter(first_value)
+        for setter, values in zip(setters[1:], series[1:], strict=True):
+            setter(float(values[0]))
         executive.settle()
         fdm.set_trim_status(inputs.surface)  # trim status lets actuators pass their input through
         executive.choose_integrator()
 
         gets = [node.get_double_value for node in self._read]
-        records = [get() for get in gets]
-        run, every = fdm.run, self._record_every
-        extend = records.extend
-        fed = () if loop is None else loop.setters
-        pairs = zip(setters, series, strict=True)
-        moving = [(s, v) for s, v in pairs if v.count(v[0]) < len(v) or s in fed]
-        count = len(series[0]) - 1
-        steps = list(zip(*(values[1:] for _, values in moving), strict=True)) or [()] * count
-        write = _writer([setter for setter, _ in moving])
-        for first in range(0, count - every + 1, every):
+        records = array("d", [get() for get in gets])
+        run, every, extend = fdm.run, self._record_every, records.extend
+        driven = _Schedule(setters, series, () if loop is None else loop.setters)
+        write, steps, changes = driven.write, driven.steps, driven.changes
+        eventful = {(step - 1) // every for step in changes}
+        for record, first in enumerate(range(0, len(steps) - every + 1, every)):
             if loop is not None:
                 loop.sample(first)
-            for values in steps[first : first + every]:
-                write(*values)
-                if not run():
-                    raise FlightError(f"the model ended the flight at {fdm.get_sim_time():.3f} s")
+            if record in eventful:
+                for step in range(first + 1, first + every + 1):
+                    for setter, value in changes.get(step, ()):
+                        setter(value)
+                    write(*steps[step - 1])
+                    if not run():
+                        raise _ended(fdm)
+            else:
+                for present in steps[first : first + every]:
+                    write(*present)
+                    if not run():
+                        raise _ended(fdm)
             extend([get() for get in gets])
-        return np.array(records).reshape(-1, len(gets)).T
+        return np.frombuffer(records).reshape(-1, len(gets)).T
 
     def _loop(self, inputs: Inputs) -> Loop | None:
         """The feedback of a run, connected to the motion."""
@@ -210,7 +219,7 @@ class Flight:
 
     def _inputs(
         self, inputs: Inputs, loop: Loop | None
-    ) -> tuple[list[Callable[[float], object]], list[list[float]]]:
+    ) -> tuple[list[Callable[[float], object]], list[Array]]:
         """Setters and their values at every step; the elevator first."""
         executive, elevator = self._executive, self._elevator
         absolute = self.trim.controls.elevator_command_rad + inputs.command_rad
@@ -236,7 +245,7 @@ class Flight:
         if loop is not None:
             fed = slice(aileron, aileron + len(self._lateral))
             setters[fed] = loop.added(setters[fed], [surface.command_per_rad for surface in self._lateral])
-        return setters, [np.asarray(values, dtype=np.float64).tolist() for _, values in pairs]
+        return setters, [np.asarray(values, dtype=np.float64) for _, values in pairs]
 
     def _lateral_inputs(self, inputs: Inputs) -> list[tuple[str, Array]]:
         """Properties and values of the lateral inputs, the commands of aileron and rudder first."""
@@ -269,6 +278,45 @@ class Flight:
         fdm[names.damper_gain] = inputs.damper_gain_s
         fdm[names.attitude_gain] = inputs.attitude_gain
         fdm[names.theta_reference] = self._theta_rad
+
+
+class _Schedule:
+    """Values to write at every step, and those to write at the steps where they change, which a command of steps does seldom.
+
+    Parameters
+    ----------
+    setters, series : of each property, its setter and its (samples,) values.
+    fed : setters that add to what they are given, and are called at every step.
+
+    Attributes
+    ----------
+    write : writes the values of one step; steps : (samples - 1) values of each step from the first.
+    changes : step -> setters and values of properties that seldom change.
+    """
+
+    def __init__(
+        self,
+        setters: Sequence[Callable[[float], object]],
+        series: Sequence[Array],
+        fed: Sequence[Callable[[float], object]],
+    ) -> None:
+        count = len(series[0]) - 1
+        always, values = [], []
+        self.changes: dict[int, list[tuple[Callable[[float], object], float]]] = {}
+        for setter, column in zip(setters, series, strict=True):
+            changed = np.flatnonzero(np.diff(column)) + 1
+            if setter in fed or len(changed) > _SELDOM * count:
+                always.append(setter)
+                values.append(column[1:].tolist())
+                continue
+            for step in changed.tolist():
+                self.changes.setdefault(step, []).append((setter, float(column[step])))
+        self.steps: list[tuple[float, ...]] = list(zip(*values, strict=True)) or [()] * count
+        self.write = _writer(always)
+
+
+def _ended(fdm: Any) -> FlightError:
+    return FlightError(f"the model ended the flight at {fdm.get_sim_time():.3f} s")
 
 
 def _writer(setters: Sequence[Callable[[float], object]]) -> Callable[..., object]:

@@ -259,15 +259,11 @@ class Pilot:
     def _log(self, flown: list[PlannedRun], channels: list[dict[str, Array]]) -> FlightLog:
         plan, every = self.plan, self._record_every
         truth = {name: np.stack([c[name] for c in channels]) for name in channels[0]}
-        noise: dict[str, Array] = {
-            name: np.stack(
-                [
-                    streams.normals(plan.seed, run.run, streams.SENSORS[name], plan.samples)[::every]
-                    for run in flown
-                ]
-            )
-            for name in self._noisy
-        }
+        noise = {name: np.empty_like(truth[name]) for name in self._noisy}
+        for row, run in enumerate(flown):
+            for name, own in noise.items():
+                drawn = streams.normals(plan.seed, run.run, streams.SENSORS[name], plan.samples)
+                own[row] = drawn[::every]
         logged = measure.log_channels(
             truth, self._models, noise, plan.dt_s * every, plan.log_every // every, self._readings
         )
