@@ -81,9 +81,11 @@ lateral: $(DEVELOP) ## the lateral estimators: affine aircraft, RUNS flights of 
 	for level in 0 1 2; do $(BIN)/python -m studies.lateral_study --runs $(RUNS) --level $$level || exit 1; done
 	$(BIN)/python -m studies.lateral_flights --out $(OUT)/lateral --runs $(RUNS) --jobs $(JOBS)
 	$(BIN)/python -m studies.lateral_causes
+	$(BIN)/python -m studies.measured_lateral
 
 fleet: $(READY) ## 35 aircraft of the JSBSim package surveyed, flown and traced (hours; continues after an interruption)
 	$(BIN)/python -m studies.foreign_fleet --out $(OUT)/fleet
+	$(BIN)/python -m studies.foreign_lateral_calm --out $(OUT)/lateral-fleet
 
 planned: $(DEVELOP) ## planned flights of six pairs of effects, flown and traced (about an hour; continues after an interruption)
 	$(BIN)/python -m studies.planned_flights --out $(OUT)/planned
@@ -116,7 +118,7 @@ fuzz: kernels ## damage 38,000 logs, imported files, TOML files and results and 
 robustness: $(DEVELOP) ## kill commands 200 times and damage a campaign 150 times; every file has to be restored (about an hour)
 	$(BIN)/python -m validation.robustness --kills 200 --damages 150 --seed 1
 
-mutants: $(DEVELOP) ## mutation testing of physics, regression, covariance, campaign and resume (about an hour)
+mutants: $(DEVELOP) ## mutation testing of physics, regression, covariance, campaign, resume and the selection of effects (about an hour)
 	$(BIN)/python $(INSTALL) cosmic-ray==8.7.0
 	$(BIN)/python -m scripts.mutants --jobs $(JOBS)
 

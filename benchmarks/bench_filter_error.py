@@ -19,7 +19,8 @@ from airtruth.identification import Options, identify_batch, quantities
 from airtruth.identification.likelihood.cramer_rao import experiment_bound
 from airtruth.identification.likelihood.fit import FilterOptions, fit, fit_joint
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.short_period import PARAMETERS, modal
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import modal
 from validation.linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, doublet, fly, gtm_scale
 
 PRIOR = 0.2
@@ -62,7 +63,7 @@ def quality(gust: float, start: str, runs: int) -> None:
     theta, failed = started(batch)
     truth = np.append(THETA, modal(THETA, gtm_scale()))
     print(f"\n{gust:g} x light, gusts {start}, {runs} runs; iv-f1 fails in {failed}")
-    print(" " * 30 + "".join(f"{n:>9s}" for n in PARAMETERS))
+    print(" " * 30 + "".join(f"{n:>9s}" for n in LONGITUDINAL.parameters))
     for name, prior in (("levels known", None), ("levels estimated", PRIOR)):
         options = declared(gust, prior)
         estimates = fit(batch, GTM, theta, options)

@@ -19,7 +19,8 @@ from airtruth.identification import COVARIANCES, METHODS, Options, identify_batc
 from airtruth.identification.condition import observe
 from airtruth.identification.methods import method
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.short_period import MODAL, PARAMETERS, modal
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import modal
 from validation.linear_flight import GTM, THETA, fly, gtm_scale
 
 DISTINCT, TIMES, STEPS = 1000, 10, 25
@@ -126,7 +127,10 @@ def coverage() -> None:
     truth = np.append(THETA, modal(THETA, gtm_scale()))
     for gust in (1.0, 2.0):
         batch = fly(runs=DISTINCT, gust=gust, noise=1.0, seed=7)
-        print(f"{gust:g} x light".ljust(37) + "".join(f"{n:>9s}" for n in (*PARAMETERS, *MODAL)))
+        print(
+            f"{gust:g} x light".ljust(37)
+            + "".join(f"{n:>9s}" for n in (*LONGITUDINAL.parameters, *LONGITUDINAL.modal))
+        )
         for name in METHODS:
             for covariance in COVARIANCES:
                 estimates = identify_batch(batch, GTM, name, Options(covariance=covariance))

@@ -24,7 +24,7 @@ from airtruth.identification import Options, identify_batch, quantities
 from airtruth.identification.likelihood.cramer_rao import experiment_bound
 from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import G0
 from validation.linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, fly, gtm_scale
 
@@ -87,7 +87,7 @@ def peer_model(gust_state: bool) -> object:
     return aeroid.Model(
         states=("path", "rate", *(("gust",) if gust_state else ())),
         controls=("elevator",),
-        parameters=dict.fromkeys((*PARAMETERS, *(f"b_{n}" for n in OUTPUTS)), 0.0),
+        parameters=dict.fromkeys((*LONGITUDINAL.parameters, *(f"b_{n}" for n in OUTPUTS)), 0.0),
         dynamics=dynamics,
         outputs=OUTPUTS,
         measurement=measurement,
@@ -134,7 +134,7 @@ def peer(title: str, batch: Batch, start: Array, least: Array, method: str, gust
     theta, std, good = np.full((runs, 6), np.nan), np.full((runs, 6), np.nan), np.zeros(runs, dtype=bool)
     begun = time.process_time()
     for run in range(runs):
-        guess = dict(zip(PARAMETERS, start[run], strict=True))
+        guess = dict(zip(LONGITUDINAL.parameters, start[run], strict=True))
         guess |= {"b_alpha": 1e-3, "b_q": 1e-3, "b_az": 1e-1}
         try:
             with warnings.catch_warnings():
@@ -150,8 +150,8 @@ def peer(title: str, batch: Batch, start: Array, least: Array, method: str, gust
                 )
         except aeroid.AeroidError:
             continue
-        theta[run] = [found.parameters[n] for n in PARAMETERS]
-        std[run] = [found.stderr[n] for n in PARAMETERS]
+        theta[run] = [found.parameters[n] for n in LONGITUDINAL.parameters]
+        std[run] = [found.stderr[n] for n in LONGITUDINAL.parameters]
         good[run] = found.success
     line(title, theta, std, good, least, time.process_time() - begun)
 
@@ -162,7 +162,7 @@ def main() -> None:
     least = np.sqrt(np.diag(experiment_bound(fly(), GTM, THETA, FilterOptions(*levels))[0]))
     batch = fly(runs=records, gust=GUST, noise=1.0, seed=61)
     print(f"\nPeers on {records} records, {GUST:g} x light: RMSE over the Cramer-Rao bound")
-    heads = "".join(f"{n:>8s}" for n in PARAMETERS)
+    heads = "".join(f"{n:>8s}" for n in LONGITUDINAL.parameters)
     print(f"{'':30s}{heads}    mean  coverage %  failed ms/record")
     start = ours(batch, least)
     if importlib.util.find_spec("aeroid") is None:

@@ -23,7 +23,8 @@ from airtruth.identification import Estimates, Options, identify_batch, identify
 from airtruth.logs import store
 from airtruth.logs.flight_log import Batch, batches
 from airtruth.physics.longitudinal import auxiliary, simulate
-from airtruth.physics.short_period import PARAMETERS, Scale, system
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import Scale, system
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.simulation.linearise import linearise
@@ -204,7 +205,7 @@ def errors(theta: Array, truth: Array) -> str:
         return " | ".join([f"{'none':>15}"] * len(SHOWN))
     cells = []
     for name in SHOWN:
-        i = PARAMETERS.index(name)
+        i = LONGITUDINAL.parameters.index(name)
         error = 100.0 * (theta[:, i] / truth[i] - 1.0)
         spread = error.std(ddof=1) / np.sqrt(len(error)) if len(error) > 1 else np.nan
         cells.append(f"{error.mean():+8.2f} ± {spread:4.2f}" if len(error) > 1 else f"{error.mean():+8.2f}")

@@ -27,7 +27,7 @@ from airtruth.identification import METHODS, Options, identify_batch, quantities
 from airtruth.identification.likelihood.cramer_rao import experiment_bound
 from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from validation.linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, doublet, fly
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def main() -> None:
         batches = flown(chosen.runs, chosen.gust, chosen.start, acting)
         least = bound(chosen.gust, chosen.start, experiment == "measured")
         print(f"\n{experiment}: {chosen.runs} records, {chosen.gust:g} x light, gusts {chosen.start}")
-        print(" " * 22 + "".join(f"{n:>9s}" for n in PARAMETERS))
+        print(" " * 22 + "".join(f"{n:>9s}" for n in LONGITUDINAL.parameters))
         line("bound", least, "9.4f")
         for name in methods:
             report(name, batches, "measured" if experiment == "measured" else "constant", least)

@@ -23,7 +23,7 @@ from airtruth.identification import Options, identify_batch
 from airtruth.logs import store
 from airtruth.logs.flight_log import Batch, batches
 from airtruth.physics.longitudinal import Longitudinal, simulate
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.simulation.linearise import Linearisation, linearise
@@ -44,7 +44,7 @@ NAMES: Final = ("c172x", "f16", "T38")
 METHODS: Final = ("iv-f1", "ls")
 """Methods of the study."""
 
-CMQ: Final = PARAMETERS.index("Cmq")
+CMQ: Final = LONGITUDINAL.parameters.index("Cmq")
 """Index of Cmq among the derivatives."""
 
 IN_FILE: Final = {"c172x": (-12.4, -5.2, 3.9, 1.7), "T38": (-18.0, -9.0, 0.0, 0.0)}
@@ -186,7 +186,9 @@ def expected_cmq(flown: Flown, cmq: float, cm_alpha_dot: float, cl_q: float, cl_
     names = ("inertia/cg-x-in", "metrics/aero-rp-x-in")
     cg, reference = (node.get_double_value() * INCH for node in executive.nodes(names))
     arm, s = (cg - reference) / flown.aircraft.chord_m, flown.linear.scale
-    turn = 1.0 - float(s.lift * s.half_chord_time) * flown.linear.central[PARAMETERS.index("CLq")]
+    turn = (
+        1.0 - float(s.lift * s.half_chord_time) * flown.linear.central[LONGITUDINAL.parameters.index("CLq")]
+    )
     return float(cmq + arm * cl_q + (cm_alpha_dot + arm * cl_alpha_dot) * turn)
 
 
@@ -200,7 +202,7 @@ def row(label: str, flown: Flown, methods: Sequence[str] = METHODS, batch: Batch
 
 
 HEADER: Final = "| case | method | " + " | ".join(
-    f"{name}: model, estimate, error %" for name in (*PARAMETERS[3:], PARAMETERS[0])
+    f"{name}: model, estimate, error %" for name in (*LONGITUDINAL.parameters[3:], LONGITUDINAL.parameters[0])
 )
 """Heading of the tables."""
 

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from airtruth.errors import AirtruthError
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.simulation.foreign_aircraft import CAMPAIGN, new_from_jsbsim
@@ -123,7 +123,9 @@ def sigmas(row: dict[str, Any]) -> list[float]:
     """Distance of each derivative from the linearisation, in standard deviations of the estimate."""
     shifts = row.get("declared_model", {}).get("shifts", {})
     return [
-        (shifts[n]["estimate"] - shifts[n]["declared"]) / shifts[n]["std"] for n in PARAMETERS if n in shifts
+        (shifts[n]["estimate"] - shifts[n]["declared"]) / shifts[n]["std"]
+        for n in LONGITUDINAL.parameters
+        if n in shifts
     ]
 
 

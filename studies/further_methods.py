@@ -18,7 +18,7 @@ import numpy as np
 from airtruth import aircraft
 from airtruth.identification import identify
 from airtruth.logs.store import read_table
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting.paper.tables import FURTHER
 from airtruth.simulation.campaign import plan as planning
 from airtruth.simulation.campaign import run as flying
@@ -43,7 +43,7 @@ def flown(campaign: Path, out: Path, runs: int) -> Path:
 def report(title: str, folder: Path) -> None:
     """Print the RMSE of iv-f1, and the ratios of the other methods to it."""
     truth = read_table(folder / "truth.parquet").set_index("run_id")
-    names = list(PARAMETERS)
+    names = list(LONGITUDINAL.parameters)
     estimates = identify(folder, aircraft.load(GTM), ("iv-f1", *FURTHER)).to_frame()
     print(f"\n{title}, {len(truth)} runs".ljust(34) + "".join(f"{n:>9s}" for n in names))
     reference = np.ones(len(names))

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from airtruth.errors import AircraftError, AirtruthError
 from airtruth.physics import handbook
 from airtruth.physics.handbook import Planform
-from airtruth.physics.short_period import CL_Q, PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import CL_Q
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.foreign_aircraft import CAMPAIGN, new_from_jsbsim
 from airtruth.simulation.resolution import trimmed_and_linear
@@ -84,7 +85,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Print each model and the statistics of all."""
     names = list(sys.argv[1:] if argv is None else argv) or NAMES
     errors = []
-    sys.stdout.write("flown/proposed " + " ".join(PARAMETERS) + "\n")
+    sys.stdout.write("flown/proposed " + " ".join(LONGITUDINAL.parameters) + "\n")
     for name in names:
         try:
             with tempfile.TemporaryDirectory() as folder:
@@ -93,7 +94,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             sys.stdout.write(f"{name}: {str(error).splitlines()[0][:100]}\n")
             continue
         proposed = handbook.derivatives(planform_of(name))
-        value = np.array([proposed[key] for key in PARAMETERS])
+        value = np.array([proposed[key] for key in LONGITUDINAL.parameters])
         margin = value[3] / value[0] - flown[3] / flown[0]  # flown less proposed [chords]
         is_complete = abs(flown[CL_Q]) > _NO_TERM
         if is_complete:

@@ -1,11 +1,11 @@
 """The lateral estimators on flights of the GTM's tables in JSBSim: tables as the paper's, coverage, nonlinear terms.
 
 Variants of data/campaigns/lateral.toml are flown: surfaces at 3 deg in light and moderate turbulence, and at 3 to 4 deg in
-light turbulence. Every method estimates each run with the measured dynamic pressure, in the first two campaigns with the
-constant one as well, and joint sets of four runs. `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables.
-An interrupted study continues.
+light turbulence. The campaign in moderate turbulence has twice the runs of the others, as in the paper. Every method estimates
+each run with the measured dynamic pressure, in the first two campaigns with the constant one as well, and joint sets of four
+runs. `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables. An interrupted study continues.
 
-    python -m studies.lateral_flights --out DIR [--runs N] [--jobs J] [METHOD ...]
+    python -m studies.lateral_flights --out DIR [--runs N] [--jobs J] [--single] [METHOD ...]
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from airtruth.table import Table, as_markdown, flat
 ROOT = Path(__file__).resolve().parents[1]
 CAMPAIGN = ROOT / "data" / "campaigns" / "lateral.toml"
 FLOWN = {
-    "light-3": ((3.0, 3.0), "light"),
-    "moderate-3": ((3.0, 3.0), "moderate"),
-    "light": ((3.0, 4.0), "light"),
+    "light-3": ((3.0, 3.0), "light", 1),
+    "moderate-3": ((3.0, 3.0), "moderate", 2),
+    "light": ((3.0, 4.0), "light", 1),
 }
-"""Name -> least and largest deflection [deg], level of the turbulence."""
+"""Name -> least and largest deflection [deg], level of the turbulence, runs over those asked for."""
 CONSTANT = ("light-3", "moderate-3")
 """Campaigns that are identified with a constant dynamic pressure as well."""
 SET = 4
@@ -61,7 +61,7 @@ SCORED = [LATERAL.index(name) for name in LATERAL.scored]
 
 def fly(name: str, out: Path, runs: int, jobs: int) -> Path:
     """Fly a campaign into OUT/NAME; return its folder."""
-    (low, high), level = FLOWN[name]
+    (low, high), level, share = FLOWN[name]
     text = CAMPAIGN.read_text(encoding="utf-8")
     text = re.sub(
         r"\{ low = 3.0, high = 4.0 \}", f"{{ low = {low}, high = {high} }}" if low < high else f"{low}", text
@@ -77,7 +77,7 @@ def fly(name: str, out: Path, runs: int, jobs: int) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     file = out / f"{name}.toml"
     file.write_text(text, encoding="utf-8")
-    campaign.fly(plan.make(file, runs=runs), out / name, jobs)
+    campaign.fly(plan.make(file, runs=share * runs), out / name, jobs)
     return out / name
 
 
@@ -168,13 +168,16 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--single", action="store_true", help="the tables of single runs alone")
     parser.add_argument("methods", nargs="*", default=list(LATERAL_METHODS))
     asked = parser.parse_args()
     gtm = load(ROOT / "aircraft" / "gtm")
     folders: list[Path] = []
-    for name in FLOWN:
+    for name in CONSTANT if asked.single else FLOWN:
         folder = fly(name, asked.out, asked.runs, asked.jobs)
         folders += estimate(folder, gtm, asked.methods)
+        if asked.single:
+            continue
         truth = read_table(folder / "truth.parquet")[list(LATERAL.parameters)].iloc[0].to_numpy()
         own = records(folder)
         chosen = [m for m in asked.methods if m != "output-error"]

@@ -27,7 +27,7 @@ from airtruth.identification import METHODS, Options, identify
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import log_paths, read_log, read_table, write_table
 from airtruth.loop import identify_without_effects
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting import read_campaign
 from airtruth.reporting.loop import WITH_EFFECTS, LoopTable, evaluate, without, write_loop
 from airtruth.reporting.loop_figures import bias_figure
@@ -175,7 +175,7 @@ def affine(out: Path, runs: int, jobs: int) -> str:
     changed.write_text(CAMPAIGN.read_text().replace('aircraft = "gtm"', f'aircraft = "{plane}"'))
     fly(changed, out / "affine", runs, jobs)
     found = identify_all(log_paths(out / "affine"), None, jobs)
-    names = list(PARAMETERS)
+    names = list(LONGITUDINAL.parameters)
     truth = read_table(out / "affine" / "truth.parquet")[names].mean().to_numpy()
     lines = [f"Affine aerodynamics, {runs} runs: bias [%] (standard error)"]
     lines.append(" " * 24 + "".join(n.rjust(16) for n in names))

@@ -25,7 +25,6 @@ from airtruth.identification import estimates_table, identify_batch
 from airtruth.logs.flight_log import Batch
 from airtruth.logs.store import read_table, write_table
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.reporting.campaign import read_campaign
 from airtruth.reporting.paper.comparison import RUNS, together
 from airtruth.reporting.paper.tables import TABLES, Entry, PaperTable, evaluate
@@ -109,7 +108,7 @@ def misfit(tables: Sequence[PaperTable], level: str, only: Sequence[str]) -> tup
             for t in tables
             for method in PRINTED_COLUMNS[level][t.spec.name]
             if method in only
-            for parameter in PARAMETERS
+            for parameter in LONGITUDINAL.parameters
         ]
         result.append(math.sqrt(np.mean(np.square(z))))
     return result[0], result[1]
@@ -168,13 +167,16 @@ def settings_table(study: Study, cases: Sequence[Case]) -> Table:
 
 def comparison_table(study: Study, case: Case) -> Table:
     """Every column of the paper beside ours: means, standard deviations, RelErr, its ratio and iterations."""
-    columns = ("", *PARAMETERS, "RelErr %", "ratio", "iterations")
+    columns = ("", *LONGITUDINAL.parameters, "RelErr %", "ratio", "iterations")
     rows: list[Row] = []
     for table in tables_of(study, case):
         for method in PRINTED_COLUMNS[case.level][table.spec.name]:
-            keys = [(p, "mean") for p in PARAMETERS] + [(SIX, "relerr_pct"), (SIX, "relerr_ratio")]
+            keys = [(p, "mean") for p in LONGITUDINAL.parameters] + [
+                (SIX, "relerr_pct"),
+                (SIX, "relerr_ratio"),
+            ]
             found = [table.entries.get((method, *key)) for key in [*keys, (RUNS, "iterations")]]
-            stds = [table.entries[method, p, "std"] for p in PARAMETERS]
+            stds = [table.entries[method, p, "std"] for p in LONGITUDINAL.parameters]
             count = table.statistics[method].counts
             rows.append(
                 (f"{method}, {count.used} of {count.total} runs", *(shown(e) if e else "" for e in found))
@@ -192,19 +194,19 @@ def comparison_table(study: Study, case: Case) -> Table:
 
 def methods_table(study: Study, cases: Sequence[Case], methods: Sequence[str]) -> Table:
     """Means of the six derivatives and RelErr, one row per case and method."""
-    columns = ("", "method", *PARAMETERS, "RelErr %")
+    columns = ("", "method", *LONGITUDINAL.parameters, "RelErr %")
     rows: list[Row] = []
     for case in cases:
         tables = tables_of(study, case)
         for method in methods:
-            keys = [(p, "mean") for p in PARAMETERS] + [(SIX, "relerr_pct")]
+            keys = [(p, "mean") for p in LONGITUDINAL.parameters] + [(SIX, "relerr_pct")]
             rows.append((case.label, method, *(shown(entry(tables, method, *key)) for key in keys)))
     return flat("Means by case and method", columns, rows)
 
 
 def further_table(study: Study) -> Table:
     """Runs used, means, standard deviations and RelErr of methods beside the paper's, at three levels of turbulence."""
-    columns = ("turbulence", "method", "runs", *PARAMETERS, "RelErr %")
+    columns = ("turbulence", "method", "runs", *LONGITUDINAL.parameters, "RelErr %")
     rows: list[Row] = []
     for case in (SETTINGS[0], MODERATE[0], SEVERE):
         tables = tables_of(study, case, LEVELS_COMPARED)
@@ -212,18 +214,18 @@ def further_table(study: Study) -> Table:
         for method in LEVELS_COMPARED:
             table = next(t for t in tables if method in t.statistics)
             count = table.statistics[method].counts
-            means = [table.entries[method, p, "mean"] for p in PARAMETERS]
+            means = [table.entries[method, p, "mean"] for p in LONGITUDINAL.parameters]
             relative = table.entries[method, SIX, "relerr_pct"]
             used = f"{count.used} of {count.total}"
             rows.append((level, method, used, *(shown(e) for e in (*means, relative))))
-            stds = [table.entries[method, p, "std"] for p in PARAMETERS]
+            stds = [table.entries[method, p, "std"] for p in LONGITUDINAL.parameters]
             rows.append(("", "", "std", *(shown(e) for e in stds), ""))
     return flat("Light, moderate and severe turbulence", columns, rows)
 
 
 def breaks_table(study: Study) -> Table:
     """Without noise and gusts: the GTM's tables, the planes that touch them at the trim, and further regressors."""
-    columns = ("aircraft", "doublet", "method", *PARAMETERS)
+    columns = ("aircraft", "doublet", "method", *LONGITUDINAL.parameters)
     rows: list[Row] = []
     for amplitude in ("1.0", "-1.0", "2.0"):
         case = Case("", settings={"amplitude_deg": amplitude}, u=0.0, w=0.0, extra=IDEAL)
@@ -233,7 +235,7 @@ def breaks_table(study: Study) -> Table:
         if not target.exists():
             affine_copy(GTM, target, float(truth["trim_alpha_rad"]), float(truth["trim_elevator_rad"]))
         if amplitude == "1.0":
-            rows.append(("truth", "", "", *(f"{truth[name]:.4g}" for name in PARAMETERS)))
+            rows.append(("truth", "", "", *(f"{truth[name]:.4g}" for name in LONGITUDINAL.parameters)))
         for label, where in (("tables", folder), ("affine", flown(study, case, runs=1, folder=target))):
             batch = next(records(where, case))
             for method in ("ls", "iv-lowpass", "iv-f1", "iv-f2"):

@@ -43,7 +43,7 @@ from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.logs.atomic import write_text
 from airtruth.logs.sources import named_logs
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign import run as flying
 from airtruth.simulation.campaign.chunk import Pilot
@@ -249,7 +249,7 @@ def traced(
     drawn = np.linalg.cholesky(covariance) @ rng.standard_normal(6)
     derivatives = {
         "name": "derivatives",
-        **{f"d{n}": float(x) for n, x in zip(PARAMETERS, drawn, strict=True)},
+        **{f"d{n}": float(x) for n, x in zip(LONGITUDINAL.parameters, drawn, strict=True)},
     }
     effects = [effect_table(member.effect, values), derivatives]
     campaign = planned_campaign.model_copy(

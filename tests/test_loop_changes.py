@@ -11,19 +11,24 @@ from airtruth.logs.histories import Histories, History
 from airtruth.loop import loop_table
 from airtruth.loop.changes import changes_of, quantile
 from airtruth.loop.same_inputs import simulated_logs
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.table import as_text
 from airtruth.tracing.answer import Derivatives
 
-DECLARED = dict.fromkeys(PARAMETERS, -2.0)
-REFIT = Derivatives(DECLARED, DECLARED, dict.fromkeys(PARAMETERS, -1.8), dict.fromkeys(PARAMETERS, 0.01))
+DECLARED = dict.fromkeys(LONGITUDINAL.parameters, -2.0)
+REFIT = Derivatives(
+    DECLARED,
+    DECLARED,
+    dict.fromkeys(LONGITUDINAL.parameters, -1.8),
+    dict.fromkeys(LONGITUDINAL.parameters, 0.01),
+)
 
 
 def estimates(values, converged=(True, True, True)):
     rows = [
         {"run_id": f"r{k}", "method": "ls", "converged": good}
-        | dict.fromkeys(PARAMETERS, value)
-        | {f"{name}_std": 0.05 for name in PARAMETERS}
+        | dict.fromkeys(LONGITUDINAL.parameters, value)
+        | {f"{name}_std": 0.05 for name in LONGITUDINAL.parameters}
         for k, (value, good) in enumerate(zip(values, converged, strict=False))
     ]
     return SimpleNamespace(methods=("ls",), to_frame=lambda: pd.DataFrame(rows))

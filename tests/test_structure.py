@@ -1,6 +1,7 @@
 """Bounds on the structure of the package: sizes, arguments, documented constants, no private imports."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -117,3 +118,40 @@ def annotations(function: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
     arguments = [a.annotation for a in (*function.args.args, *function.args.kwonlyargs) if a.annotation]
     returned = [function.returns] if function.returns else []
     return " ".join(ast.unparse(a) for a in (*arguments, *returned))
+
+
+def test_frozen_dataclasses_hold_no_cache():
+    """What is computed from a value is kept beside it (`airtruth.numerics.kept`), or is a cached property."""
+    hidden = [
+        f"{name_of(path)}: {c.name}.{ast.unparse(field.target)}"
+        for path in FILES
+        for c in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(c, ast.ClassDef) and any("frozen=True" in ast.unparse(d) for d in c.decorator_list)
+        for field in c.body
+        if isinstance(field, ast.AnnAssign) and field.value and "init=False" in ast.unparse(field.value)
+    ]
+    assert not hidden
+
+
+def test_nothing_before_the_search_imports_it():
+    rooms = (
+        "tracing/model/",
+        "tracing/inference/",
+        "tracing/calibration/",
+        "tracing/prepare.py",
+        "tracing/conditions.py",
+    )
+    upward = [
+        name_of(path)
+        for path in FILES
+        if name_of(path).startswith(rooms)
+        and "airtruth.tracing.selection" in path.read_text(encoding="utf-8")
+    ]
+    assert not upward
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_docstrings_begin_with_a_noun_or_a_verb(path):
+    """A docstring names its subject: no noun clause (What the filter reads) and no bare genitive (Of a problem)."""
+    clauses = re.findall(r'"""(?:What|Of) [^\n]*', path.read_text(encoding="utf-8"))
+    assert not clauses

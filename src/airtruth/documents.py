@@ -92,7 +92,7 @@ def _parsed(
 
 
 def _problem(document: object, deepest: int) -> str:
-    """What no reader of a document expects, a deep nesting or an integer beyond 64 bits; "" if there is none."""
+    """Content that no reader of a document expects, a deep nesting or an integer beyond 64 bits; "" if there is none."""
     level = [document]
     for _ in range(deepest + 1):
         if any(isinstance(entry, int) and not -(2**63) <= entry < 2**63 for entry in level):

@@ -7,7 +7,7 @@ from airtruth.aircraft.corrected import reference_point, write_corrected
 from airtruth.aircraft.file import Dynamics
 from airtruth.aircraft.jsbsim.short_period import TrimPoint
 from airtruth.physics.atmosphere import altitude_of_density_m, equivalent_airspeed_m_s
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, SensorTerm, StateTerm, SurfaceTerm
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.simulator import Condition
@@ -81,14 +81,14 @@ def test_declared_dynamics_count_once(tmp_path):
     assert new.file.dynamics == dynamics
     eas = float(equivalent_airspeed_m_s(AT.airspeed_m_s, AT.density_kg_m3))
     found = trim(new, Condition(eas, float(altitude_of_density_m(AT.density_kg_m3)), 0.0))
-    declared = [plane.file.derivatives[name].value for name in PARAMETERS]
+    declared = [plane.file.derivatives[name].value for name in LONGITUDINAL.parameters]
     np.testing.assert_allclose(linearise(new, found).central, declared, rtol=1e-3, atol=1e-3)
 
 
 def test_the_reference_of_an_elevator_that_is_less_effective(tmp_path):
     """Cm = Cmde (k de_t - de_r) = 0."""
     plane = small.declared(tmp_path)
-    values = {name: plane.file.derivatives[name].value for name in PARAMETERS}
+    values = {name: plane.file.derivatives[name].value for name in LONGITUDINAL.parameters}
     at = reference_point(plane, values, AT, Change(declared=(DeclaredTerm("elevator", 0.8),)))
     assert at.elevator_rad == pytest.approx(0.8 * ELEVATOR, rel=1e-12)
     assert at.az_m_s2 == pytest.approx(AT.az_m_s2, rel=1e-12)

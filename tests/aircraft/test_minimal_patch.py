@@ -14,7 +14,7 @@ from airtruth.aircraft.jsbsim.document import parse
 from airtruth.aircraft.origin import Origin, rounded
 from airtruth.aircraft.toml_patch import patched
 from airtruth.aircraft.write import Corrections, write_aircraft
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, SensorTerm, SurfaceTerm
 from airtruth.quantity import Quantity
 from airtruth.toml_places import places
@@ -22,8 +22,10 @@ from airtruth.toml_places import places
 MOST_LINES = 40
 """Changed lines of both files for one arm and six increments (the bar of a patch that a maintainer can review)."""
 ARM = SensorTerm("alpha_rad", "arm", 1.6716)
-SIX = dict(zip(PARAMETERS, (-0.26092, 10.612, 0.026032, -0.070529, -4.3993, 0.15686), strict=True))
-STD = dict(zip(PARAMETERS, (0.022, 4.9, 0.023, 0.016, 1.8, 0.012), strict=True))
+SIX = dict(
+    zip(LONGITUDINAL.parameters, (-0.26092, 10.612, 0.026032, -0.070529, -4.3993, 0.15686), strict=True)
+)
+STD = dict(zip(LONGITUDINAL.parameters, (0.022, 4.9, 0.023, 0.016, 1.8, 0.012), strict=True))
 SOURCE = "airtruth trace of 2026-11-28, records r1, r2"
 
 
@@ -57,7 +59,7 @@ def test_one_arm_and_six_increments_change_few_lines(updated):
     assert 0 < sum(map(len, changed.values())) <= MOST_LINES
     assert not [line for line in changed["gtm.xml"] if line.startswith("-")]
     removed = [line for line in changed["aircraft.toml"] if line.startswith("-")]
-    assert len(removed) == 1 + len(PARAMETERS)  # the arm, and the derivatives
+    assert len(removed) == 1 + len(LONGITUDINAL.parameters)  # the arm, and the derivatives
 
 
 def test_each_new_number_has_its_source_and_standard_deviation(updated):
@@ -65,10 +67,10 @@ def test_each_new_number_has_its_source_and_standard_deviation(updated):
     file = planes.read_file(folder)
     arm = file.sensors["alpha_rad"].x
     assert (arm.value, arm.std, arm.source) == (1.6716, 0.152, SOURCE)
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         assert (file.derivatives[name].std, file.derivatives[name].source) == (STD[name], SOURCE)
     words = [d.text for d in ET.parse(folder / "gtm.xml").getroot().iter("description")]
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         (own,) = [w for w in words if w.startswith(f"{name[:2]} += {SIX[name]!r} ")]
         assert own.endswith(f"; std {STD[name]:.3g}; {SOURCE}")
 

@@ -13,7 +13,8 @@ from airtruth.aircraft.jsbsim.short_period import TrimPoint
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.atmosphere import altitude_of_density_m, equivalent_airspeed_m_s
-from airtruth.physics.short_period import PARAMETERS, normal_force_row, system
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import normal_force_row, system
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.simulator import Condition
@@ -73,7 +74,7 @@ def written(request, tmp_path_factory):
 
 
 def derivatives_of(plane):
-    return np.array([plane.file.derivatives[name].value for name in PARAMETERS])
+    return np.array([plane.file.derivatives[name].value for name in LONGITUDINAL.parameters])
 
 
 def test_it_trims_where_it_was_asked(written):
@@ -151,7 +152,7 @@ def test_the_trim_is_the_start_of_every_run():
 
 def table(**columns):
     rows = {"run_id": ["a", "b", "c"], "method": "ls", "converged": [True, True, False]}
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         rows |= {name: [1.0, 3.0, 99.0], f"{name}_std": 0.1}
     return pd.DataFrame(rows | columns)
 

@@ -14,7 +14,7 @@ from scipy.stats import norm
 
 import airtruth as at
 from airtruth.numerics.prefilter import butterworth
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.result import MOST_LINES, shortened
 
 
@@ -25,7 +25,7 @@ def result() -> at.IdentificationResult:
 
 def test_the_tables_hold_the_arrays(result: at.IdentificationResult) -> None:
     estimates = result.of("iv-f1")
-    assert list(estimates.params.columns) == list(PARAMETERS)
+    assert list(estimates.params.columns) == list(LONGITUDINAL.parameters)
     assert list(estimates.params.index) == list(estimates.run_ids)
     np.testing.assert_array_equal(estimates.params.to_numpy(), estimates.theta)
     run = estimates.run_ids[2]

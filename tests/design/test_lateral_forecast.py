@@ -183,8 +183,9 @@ def test_a_motion_whose_controls_stand_still_is_refused(campaign, motion, messag
         forecast(plan.make(CAMPAIGNS / f"{campaign}.toml", runs=1), motion=motion)
 
 
-def test_a_derivative_of_the_other_motion_names_what_plans_it():
+def test_derivatives_of_both_motions_are_not_planned_by_one_command():
     with pytest.raises(
-        ConfigurationError, match=r"'Cnp' belongs to the lateral-directional motion.*--motion lateral"
+        ConfigurationError,
+        match="'Cnp' belongs to the lateral-directional motion, and an input determines those of one motion",
     ):
-        DerivativeQuestion(("Cnp",))
+        DerivativeQuestion(("Cmq", "Cnp"))

@@ -29,6 +29,7 @@ from airtruth.identification.likelihood.fit import fit as filter_error
 from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.physics import short_period
 from airtruth.physics.gust_figures import GustScales
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.result import Result
 from airtruth.simulation.campaign.plan import make
 from airtruth.simulation.manoeuvres import sample
@@ -225,7 +226,7 @@ def test_an_increment_of_an_answer_is_the_one_that_was_learned(bench, campaign):
     linear = behind(state, time_s=ParameterEstimate(0.1, 0.02, (None, None)))
     band = BandQuestion((linear,)).at(bench, campaign, 3, 0)
     (own,) = band.learned
-    assert own.effect.shape.trim == pytest.approx(bench.plant.trim_elevator_rad)
+    assert own.effect.shape.trim == pytest.approx(bench.plant.trims["elevator"])
     assert own.sizes == pytest.approx([0.3, 0.1])
     assert band.known == pytest.approx([0.1])
 
@@ -358,7 +359,7 @@ def test_command_line_writes_a_campaign_that_flies(quick, tmp_path):
     again = CliRunner().invoke(cli.app, line)
     assert json.loads(again.stdout) == facts
     declared = forecast(out)  # without draws of the derivatives
-    index = short_period.PARAMETERS.index("Cmq")
+    index = LONGITUDINAL.parameters.index("Cmq")
     assert facts["expected_std"]["Cmq"] == pytest.approx(declared.together[index], rel=0.1)
 
 

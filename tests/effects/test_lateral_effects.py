@@ -14,7 +14,7 @@ from airtruth.errors import AircraftError, ConfigurationError
 from airtruth.physics.composition import CAUSES, directions
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.terms import Change, DeclaredTerm
-from airtruth.simulation.linearise_lateral import linearise_lateral
+from airtruth.simulation.linearise import linearise
 from airtruth.simulation.resolution import linear_point
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import trim
@@ -74,7 +74,7 @@ def test_the_written_aircraft_has_the_derivatives_of_its_effect(gtm, level, poin
     plane = flights.changed(gtm, change, tmp_path, level)
     at = trim(plane, level)
     assert at.alpha_rad == pytest.approx(point.trim["alpha"], abs=1e-9)
-    found = linearise_lateral(plane, at).central - point.derivatives
+    found = linearise(plane, at, motion=LATERAL).central - point.derivatives
     np.testing.assert_allclose(found, expected, rtol=1e-3, atol=2e-6)
 
 
@@ -83,7 +83,7 @@ def test_the_written_aircraft_has_the_derivatives_of_its_effect(gtm, level, poin
 def test_the_effectiveness_of_a_control_scales_its_column(gtm, level, point, tmp_path, control):
     change = EFFECTS[f"{control}_effectiveness"].change({"factor": 0.7})
     plane = flights.changed(gtm, change, tmp_path)
-    found = linearise_lateral(plane, trim(plane, level)).central
+    found = linearise(plane, trim(plane, level), motion=LATERAL).central
     expected = point.derivatives.copy()
     expected[LATERAL.column(control)] *= 0.7
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=2e-4)

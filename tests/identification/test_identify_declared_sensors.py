@@ -13,9 +13,10 @@ from airtruth.identification.declared_sensors import as_ideal, taken_out
 from airtruth.identification.store import write_estimates
 from airtruth.identification.stored import read_stored
 from airtruth.numerics.prefilter import butterworth, zero_phase
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.sensors import accelerometer_az, at_instrument, measure, vane_alpha
-from airtruth.physics.short_period import PARAMETERS, system
+from airtruth.physics.short_period import system
 from airtruth.quantity import Quantity
 from validation.linear_flight import DEG, GTM, THETA, as_log, fly, gtm_scale
 
@@ -78,7 +79,7 @@ def at_arms(batch):
 def percent(batch, plane, method):
     options = Options(tolerance=1e-9, covariance="none")
     row = identify(as_log(batch), plane, [method], options).to_frame().iloc[0]
-    return 100.0 * (row[list(PARAMETERS)].to_numpy(dtype=float) / THETA - 1.0)
+    return 100.0 * (row[list(LONGITUDINAL.parameters)].to_numpy(dtype=float) / THETA - 1.0)
 
 
 @pytest.mark.parametrize("method", ["ls", "iv-f1", "iv-refined", "frequency"])

@@ -11,7 +11,8 @@ from airtruth.identification import identify
 from airtruth.identification.estimates import Estimates, Status, point_values
 from airtruth.identification.methods import METHODS
 from airtruth.logs.store import read_log
-from airtruth.physics.short_period import PARAMETERS, Scale
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import Scale
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -57,14 +58,14 @@ def test_sound_estimates_raise_no_doubt():
 )
 def test_a_wrong_sign_with_a_tight_interval_is_a_warning(name, value, words):
     theta = THETA.copy()
-    theta[PARAMETERS.index(name)] = value
+    theta[LONGITUDINAL.parameters.index(name)] = value
     (warning,) = [s for s in doubts([estimates(theta)]) if s.startswith("Warning")]
     assert doubts([estimates(theta)])[0] == warning
     assert warning.index(f"{words} of the wrong sign") < warning.index(f"{name} = ")
     for cause in ("sensor that lags", "feedback", "too short"):
         assert cause in warning
     wide = STD.copy()
-    wide[PARAMETERS.index(name)] = abs(value)
+    wide[LONGITUDINAL.parameters.index(name)] = abs(value)
     assert not [s for s in doubts([estimates(theta, wide)]) if s.startswith("Warning")]
 
 
@@ -82,7 +83,7 @@ def test_an_undetermined_direction_is_named_in_physical_terms():
 
 def test_coarse_differences_are_named():
     """1 - sin(wn dt)/(wn dt) of wn = 6.6 rad/s: 1.8 % at 20 Hz, 0.3 % at 50 Hz."""
-    wn = point_values(estimates())[0, len(PARAMETERS)]
+    wn = point_values(estimates())[0, len(LONGITUDINAL.parameters)]
     (sentence,) = module.doubts(lambda: [[estimates(method="ls"), estimates()]], 0.05)
     share = 100.0 * (1.0 - np.sin(wn * 0.05) / (wn * 0.05))
     assert sentence.startswith(f"ls: central differences at 20 Hz lose {share:.2g} % of the motion")

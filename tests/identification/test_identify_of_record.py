@@ -19,7 +19,7 @@ from airtruth.identification.record_constants import of_run, with_constants
 from airtruth.logs.flight_log import batches
 from airtruth.logs.store import write_log
 from airtruth.physics.composition import cg_transfer
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from validation.linear_flight import GTM, THETA, as_log, fly
 
 METHODS = ["ls", "iv-f1", "frequency"]
@@ -44,7 +44,7 @@ def test_a_run_is_identified_with_what_it_states_and_the_others_with_the_aircraf
     own = stating(log, mass_kg=2.0 * GTM.mass_kg, inertia_yy_kg_m2=3.0 * GTM.inertia_yy_kg_m2)
     plain, found = (by_run(identify(one, GTM, METHODS).to_frame()) for one in (log, own))
     middle = log.run_ids[1]
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         factor = 2.0 if name.startswith("CL") else 3.0
         np.testing.assert_allclose(found.loc[middle, name], factor * plain.loc[middle, name], rtol=1e-9)
     others = [run for run in log.run_ids if run != middle]
@@ -113,10 +113,10 @@ def test_joint_estimates_of_records_that_burn_fuel(method, cg):
     log = burnt(cg, noise=0.02)
     made = identify(log, GTM, [method], joint=True)
     single = identify(as_log(fly(noise=0.02, seed=10)), GTM, [method]).to_frame()
-    found, alone = made.to_frame(), single[list(PARAMETERS)].to_numpy(dtype=float)[0]
+    found, alone = made.to_frame(), single[list(LONGITUDINAL.parameters)].to_numpy(dtype=float)[0]
     assert found["converged"].all()
-    values = found[list(PARAMETERS)].to_numpy(dtype=float)[0]
-    stds = found[[f"{n}_std" for n in PARAMETERS]].to_numpy(dtype=float)[0]
+    values = found[list(LONGITUDINAL.parameters)].to_numpy(dtype=float)[0]
+    stds = found[[f"{n}_std" for n in LONGITUDINAL.parameters]].to_numpy(dtype=float)[0]
     allowed = 2.0 * np.abs(alone - THETA) + 4.0 * stds + 0.01 * np.abs(THETA)
     assert (np.abs(values - THETA) < allowed).all()
     assert any("cg_mac 0.2700" in note for note in made.notes) == cg
@@ -142,7 +142,9 @@ def test_coverage_of_a_joint_estimate_over_centres_of_gravity():
             facts[f"b{number}-{run}"] = {"cg_mac": at}
         log = replace(as_log(*parts), metadata={"record_constants": facts})
         row = identify(log, GTM, ["iv-f1"], joint=True, force=True).to_frame().iloc[0]
-        z.append([(row[n] - t) / row[f"{n}_std"] for n, t in zip(PARAMETERS, THETA, strict=True)])
+        z.append(
+            [(row[n] - t) / row[f"{n}_std"] for n, t in zip(LONGITUDINAL.parameters, THETA, strict=True)]
+        )
     spread = np.std(z, axis=0)
     assert (spread > 0.67).all()
     assert (spread < 1.5).all()

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airtruth.physics import short_period
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import G0
 
 # GTM: S, c, m, Iyy; TAS 42.85 m/s, q_bar 911.8 Pa (EAS 75 kt at 7000 ft)
@@ -113,8 +114,8 @@ def test_indices_are_the_positions_of_the_names() -> None:
         "Cmq": short_period.CM_Q,
         "Cmde": short_period.CM_DE,
     }
-    assert {name: short_period.PARAMETERS[i] for name, i in indices.items()} == dict(
-        zip(short_period.PARAMETERS, short_period.PARAMETERS, strict=True)
+    assert {name: LONGITUDINAL.parameters[i] for name, i in indices.items()} == dict(
+        zip(LONGITUDINAL.parameters, LONGITUDINAL.parameters, strict=True)
     )
 
 

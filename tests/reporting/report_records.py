@@ -9,7 +9,7 @@ import numpy as np
 from airtruth.charts import Line, Panel
 from airtruth.logs.histories import FILE, Histories, History, write_histories
 from airtruth.logs.provenance import PROVENANCE, Provenance
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.presentation.trace_histories import PANEL
 from validation.linear_flight import GTM, as_log, fly
@@ -75,7 +75,7 @@ def declared_model():
             "ci95": [-1.04 + 0.1 * k, -0.96 + 0.1 * k],
             "sigma": float(k),
         }
-        for k, name in enumerate(PARAMETERS)
+        for k, name in enumerate(LONGITUDINAL.parameters)
     }
     return {
         "consistent": False,
@@ -120,7 +120,7 @@ def loop_folder(folder):
             "runs_compared": 6,
         }
         for method in METHODS
-        for name in PARAMETERS
+        for name in LONGITUDINAL.parameters
     ]
     document = {
         "trace": answer().to_dict(),

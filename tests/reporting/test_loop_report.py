@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airtruth.errors import LogError
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting import loop, loop_figures
 from airtruth.reporting.campaign import Campaign, MethodEstimates
 from airtruth.tracing.accepted import IncrementTable
@@ -95,7 +95,7 @@ def test_formats_say_the_same(campaign, tmp_path):
     assert found["iv-f1", "after", "Cmalpha", "bias_pct"] == pytest.approx(0.8)
     assert found["iv-f1", "before", "Cmalpha", "mean"] == pytest.approx(-1.785 * 0.9)
     assert found["ls", "before", "runs", "used"] == RUNS
-    assert {r["parameter"] for r in rows} == {*PARAMETERS, "six", "runs"}
+    assert {r["parameter"] for r in rows} == {*LONGITUDINAL.parameters, "six", "runs"}
     for words in (text, paths[0].read_text(), paths[2].read_text()):
         assert "11.0" in words
         assert "missed" in words

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_damage import BYTES, DELETE, EXAMPLES, VALUES, changed, flipped, page_or_error, paths
 
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting import report
 
 TRACE = json.loads((Path(__file__).parent / "trace_sample.json").read_text())
@@ -35,7 +35,7 @@ SAMPLE = {
             "runs_compared": 5,
         }
         for method in ("ls", "iv-f1")
-        for name in PARAMETERS
+        for name in LONGITUDINAL.parameters
     ],
 }
 PATHS = [p for p in sorted(paths(SAMPLE), key=str) if p[0] != "trace"]  # the trace has a test of its own
@@ -47,17 +47,17 @@ def test_the_page_states_verdict_treatments_and_every_derivative(tmp_path):
     text = page.read_text()
     assert 'class="verdict"' in text
     assert "gyro_lag: the lag of q is undone." in text
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         assert f">{name}</th>" in text
-    assert text.count("-0.9000 \u00b1 0.020") == len(PARAMETERS) * 2
+    assert text.count("-0.9000 \u00b1 0.020") == len(LONGITUDINAL.parameters) * 2
     assert (
-        text.count("-0.0400 [-0.0678, -0.0122]") == len(PARAMETERS) * 2
+        text.count("-0.0400 [-0.0678, -0.0122]") == len(LONGITUDINAL.parameters) * 2
     )  # t of 4 degrees of freedom is 2.776
     assert "CLalpha by ls (-0.040, refit -0.030), iv-f1 (-0.040, refit -0.030); CLq" in text
     rows = data.read_text().splitlines()
     assert rows[0].startswith("method,derivative,declared,before,before_error,after")
     assert rows[1] == "ls,CLalpha,-1.0,-0.9,0.02,-0.99,0.01,6,5,-0.95,-0.98,-0.04,0.01,-0.01,0.01,5"
-    assert len(rows) == 1 + 2 * len(PARAMETERS)
+    assert len(rows) == 1 + 2 * len(LONGITUDINAL.parameters)
     assert r"\toprule" in latex.read_text()
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting import statistics
 from airtruth.reporting.paper import published
 
@@ -49,20 +49,20 @@ def test_there_are_ten_distinct_columns():
 @pytest.mark.parametrize("case", DISTINCT, ids=name)
 def test_relerr_of_the_printed_means_is_the_printed_relerr(case):
     table, column = case
-    recomputed = recomputed_pct(column, PARAMETERS)
+    recomputed = recomputed_pct(column, LONGITUDINAL.parameters)
     expected = COARSE.get((table.name, column.label))
     if expected is None:
         assert abs(recomputed - column.relerr_pct.value) <= 0.5 * column.relerr_pct.unit
     else:
         assert recomputed == pytest.approx(expected, abs=5e-4)
-    low, high = bounds_pct(column, PARAMETERS)
+    low, high = bounds_pct(column, LONGITUDINAL.parameters)
     half = 0.5 * column.relerr_pct.unit
     assert low <= column.relerr_pct.value + half
     assert high >= column.relerr_pct.value - half
 
 
 @pytest.mark.parametrize("case", DISTINCT, ids=name)
-@pytest.mark.parametrize("modal", MODAL)
+@pytest.mark.parametrize("modal", LONGITUDINAL.modal)
 def test_relerr_of_the_printed_modal_means_is_the_printed_one(case, modal):
     table, column = case
     printed = column.relerr_modal_pct[modal]

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airtruth.physics.motion import LATERAL
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
-from airtruth.simulation.linearise_lateral import STEPS, linearise_lateral
+from airtruth.simulation.linearise import STEPS, linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import trim
@@ -68,10 +69,12 @@ def test_derivatives_are_differences_of_the_independent_equations(gtm, level, ow
         side = lateral_flight.MASS * specific[1]
         return np.array([side, roll / lateral_flight.B, yaw / lateral_flight.B]) / force
 
-    steps = np.diag(STEPS)
-    slopes = [(coefficients(h) - coefficients(-h)) / (2.0 * s) for h, s in zip(steps, STEPS, strict=True)]
+    steps = list(STEPS[LATERAL.name].values())
+    slopes = [
+        (coefficients(h) - coefficients(-h)) / (2.0 * s) for h, s in zip(np.diag(steps), steps, strict=True)
+    ]
     expected = np.column_stack(slopes) / np.array([1.0, half, half, 1.0, 1.0])
-    found = linearise_lateral(gtm, level).central.reshape(3, 5)
+    found = linearise(gtm, level, motion=LATERAL).central.reshape(3, 5)
     np.testing.assert_allclose(found, expected, rtol=2e-4, atol=1e-6)
 
 

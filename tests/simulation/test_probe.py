@@ -14,8 +14,8 @@ from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.probe import Grid, alpha_dot_terms, grid_about, probe, with_breaks, with_breaks_of
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
-from airtruth.tracing.model.plant import probed, with_throttle
-from airtruth.tracing.model.remainder import looked_up
+from airtruth.tracing.model.plant import looked_up
+from airtruth.tracing.model.probed import probed, with_throttle
 from airtruth.units import DEG
 
 
@@ -136,7 +136,8 @@ def test_the_plant_of_a_propeller_has_its_forces_at_other_angles_and_airspeeds(t
     alpha = tables.alpha_rad[[a for _, a in states]]
     pressure = 0.5 * at.density_kg_m3 * tables.airspeed_m_s[[v for v, _ in states]] ** 2
     still = np.zeros(len(states))
-    _, z, moment = looked_up(plant, alpha, still + tables.elevator_rad[0], still, pressure)
+    signals = {"alpha": alpha, "elevator": still + tables.elevator_rad[0], "qhat": still}
+    _, z, moment = looked_up(plant, signals, pressure).T
     truth = np.array([tables.values[v, a, 0, 0] for v, a in states])
     assert np.abs(z - truth[:, 1]).max() < 0.001 * at.mass_kg
     assert np.abs(moment - truth[:, 2]).max() < 0.0015 * plane.constants.inertia_yy_kg_m2

@@ -9,7 +9,7 @@ import pytest
 from airtruth import aircraft
 from airtruth.errors import AircraftError, StoreError
 from airtruth.logs.verify import verify
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.foreign_aircraft import CAMPAIGN, REPORT, new_from_jsbsim
@@ -39,7 +39,7 @@ def test_the_elevator_is_found_whatever_its_command_is_called(surveyed, gtm):
 def test_the_new_folder_has_the_derivatives_of_the_model(surveyed, gtm, paper_trim):
     """In one state; the thrust, which the surveyed aircraft lacks, has no moment derivative."""
     found, declared = (linearise(plane, paper_trim).central for plane in (surveyed.aircraft, gtm))
-    moments = [PARAMETERS.index(name) for name in ("Cmalpha", "Cmq", "Cmde")]
+    moments = [LONGITUDINAL.parameters.index(name) for name in ("Cmalpha", "Cmq", "Cmde")]
     np.testing.assert_allclose(found[moments], declared[moments], rtol=1e-6)
 
 

@@ -16,7 +16,7 @@ from airtruth.physics.motion import LATERAL
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.foreign_aircraft import LATERAL_CAMPAIGN, new_from_jsbsim
-from airtruth.simulation.linearise_lateral import linearise_lateral
+from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.survey import bench as benches
@@ -114,7 +114,9 @@ def test_foreign_aircraft_fly_doublets_of_aileron_and_rudder(name, eas_kt, altit
 def test_the_damping_of_the_t38_is_that_of_its_file():
     """T38.xml states Clp -0.4, Clr 0.12 and Cnr -0.15; the yaw damper, which moves the rudder with r, is subtracted."""
     plane = aircraft.load(AIRCRAFT / "T38")
-    linear = linearise_lateral(plane, trim(plane, Condition(300 * KT, 10000 * FT, straight="wings-level")))
+    linear = linearise(
+        plane, trim(plane, Condition(300 * KT, 10000 * FT, straight="wings-level")), motion=LATERAL
+    )
     found = dict(zip(LATERAL.parameters, linear.central, strict=True))
     assert [found[name] for name in ("Clp", "Clr", "Cnr")] == pytest.approx([-0.4, 0.12, -0.15], rel=1e-3)
 

@@ -13,7 +13,7 @@ from airtruth.simulation.simulator import Condition, Executive
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG, FT, KT
 
-# M. Brunot's paper, Table 1: true values, in the order of short_period.PARAMETERS.
+# M. Brunot's paper, Table 1: true values, in the order of LONGITUDINAL.parameters.
 PAPER = np.array([4.793, 30.79, 0.480, -1.789, -41.41, -1.787])
 PAPER_WN, PAPER_ZETA = 6.632, 0.388
 
@@ -47,8 +47,8 @@ def test_a_held_throttle_is_balanced_by_the_flight_path(gtm, paper_trim):
 def test_declared_derivatives_are_the_paper_truth(gtm, paper_trim):
     linear = linearise(gtm, paper_trim)
     np.testing.assert_allclose(linear.plus, PAPER, rtol=5e-3)
-    assert linear.wn_rad_s == pytest.approx(PAPER_WN, rel=0.01)
-    assert linear.zeta == pytest.approx(PAPER_ZETA, rel=0.01)
+    assert linear.modes["wn_rad_s"] == pytest.approx(PAPER_WN, rel=0.01)
+    assert linear.modes["zeta"] == pytest.approx(PAPER_ZETA, rel=0.01)
 
 
 def test_derivatives_agree_with_differences_of_independent_equations(gtm, paper_trim):

@@ -8,7 +8,7 @@ import pytest
 from airtruth import aircraft
 from airtruth.identification import Options, identify_batch
 from airtruth.physics.longitudinal import auxiliary
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
@@ -20,7 +20,7 @@ from studies.affine_aircraft import affine_copy
 
 pytestmark = pytest.mark.slow
 
-CLALPHA, CMALPHA, CMQ = (PARAMETERS.index(name) for name in ("CLalpha", "Cmalpha", "Cmq"))
+CLALPHA, CMALPHA, CMQ = (LONGITUDINAL.parameters.index(name) for name in ("CLalpha", "Cmalpha", "Cmq"))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_gusts_in_the_loop_spare_the_filter_with_gusts_in_its_model(affine, affi
         method: study.joint(batch, 40, affine, method, options)[0] / truth - 1.0
         for method in ("ls", "iv-kalman", "filter-error", "output-error")
     }
-    shown = [PARAMETERS.index(name) for name in study.SHOWN]
+    shown = [LONGITUDINAL.parameters.index(name) for name in study.SHOWN]
     assert np.abs(error["filter-error"][shown]).max() < 0.03
     assert error["ls"][CLALPHA] < -0.1
     assert error["iv-kalman"][CLALPHA] < -0.04

@@ -83,7 +83,7 @@ def test_shown_rounds_to_the_error():
 @pytest.mark.long
 def test_misfit_is_the_rms_of_z_over_the_printed_columns(small):
     tables = study.tables_of(small, cases.SETTINGS[0])
-    z = [tables[0].entries["ls", p, "mean"].z for p in study.PARAMETERS]
+    z = [tables[0].entries["ls", p, "mean"].z for p in study.LONGITUDINAL.parameters]
     assert study.misfit(tables, "light", ["ls"])[0] == pytest.approx(np.sqrt(np.mean(np.square(z))))
     text = as_markdown(study.comparison_table(small, cases.SETTINGS[0]))
     assert "iv-actuator-regressor, 30 of 30 runs" in text

@@ -7,8 +7,8 @@ import numpy as np
 from airtruth import aircraft
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.terms import Change
-from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.parameters import ParameterLayout
+from airtruth.tracing.model.plant import LAYOUTS, ForceTable, Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord
 from airtruth.tracing.model.response import filter_inputs, kernel_input, respond
 from airtruth.tracing.model.settings import Settings
@@ -49,14 +49,15 @@ def plant(derivatives=TRUTH, alpha_slope=0.0):
         for i, a in enumerate(axis):
             own = table[:, signal] * s * np.array([1.0, b, b]) * (1.0 + alpha_slope * (a - ALPHA))
             values[signal, i] = np.outer(axis, own)
-    return LateralPlant(
+    return Plant(
         aircraft=GTM,
-        alpha_rad=axis,
-        points=np.tile(axis, (5, 1)),
-        values=values,
+        motion=LATERAL,
+        tables=tuple(
+            ForceTable(names, (axis, axis), own)
+            for names, own in zip(LAYOUTS[LATERAL.name], values, strict=True)
+        ),
         constant=np.zeros((2, 3)),
-        trim_alpha_rad=ALPHA,
-        trim_signals=np.zeros(5),
+        trims={"alpha": ALPHA} | dict.fromkeys((s.name for s in LATERAL.signals), 0.0),
         neutral_rad=np.zeros(2),
         derivatives=np.asarray(derivatives, dtype=float),
         derivative_cov=np.diag((0.1 * np.abs(TRUTH) + 1e-3) ** 2),

@@ -15,7 +15,7 @@ from airtruth.aircraft import toml
 from airtruth.aircraft.write import write_aircraft
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import write_log
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.units import DEG, G0
 from validation.blind import draw, trials
@@ -118,7 +118,9 @@ def transport(folder: Path, lag_s: float) -> Path:
             more = f", std = {std[0]!r}" if std else ""
             lines.append(f'{name} = {{ value = {value!r}, unit = "{unit}"{more} }}')
     lines.append("[derivatives]")
-    for name, value, share in zip(PARAMETERS, DECLARED.tolist(), RELATIVE_STD.tolist(), strict=True):
+    for name, value, share in zip(
+        LONGITUDINAL.parameters, DECLARED.tolist(), RELATIVE_STD.tolist(), strict=True
+    ):
         lines.append(f"{name} = {{ value = {value!r}, std = {abs(share * value)!r} }}")
     for channel, std in NOISE.items():
         unit = {"alpha_rad": "rad", "q_rad_s": "rad_s", "az_m_s2": "m_s2", "elevator_rad": "rad"}[channel]

@@ -136,7 +136,9 @@ def test_the_time_constant_of_the_short_period(gtm, paper_trim):
     from airtruth.simulation.linearise import linearise
 
     found = linearise(gtm, paper_trim)
-    assert 1.0 / (found.zeta * found.wn_rad_s) == pytest.approx(causes.TIME_CONSTANT_S, rel=0.03)
+    assert 1.0 / (found.modes["zeta"] * found.modes["wn_rad_s"]) == pytest.approx(
+        causes.TIME_CONSTANT_S, rel=0.03
+    )
 
 
 @pytest.fixture(scope="module")

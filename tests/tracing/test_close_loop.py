@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from airtruth import cli
 from airtruth.loop import LoopResult, close_loop
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.result import Result
 from airtruth.tracing import TraceOptions
 
@@ -57,10 +57,10 @@ def test_declared_model_with_the_same_inputs_is_the_reference(loop):
 
 def test_it_is_a_result(loop):
     assert isinstance(loop, Result)
-    assert len(loop.to_frame()) == len(PARAMETERS)
+    assert len(loop.to_frame()) == len(LONGITUDINAL.parameters)
     assert "elevator_rad is replaced by the surface that the air sees" in loop.summary()
     assert "<table>" in loop._repr_html_()
-    assert len(loop.plot().axes) == len(PARAMETERS)
+    assert len(loop.plot().axes) == len(LONGITUDINAL.parameters)
 
 
 def test_its_files(loop, flown):

@@ -14,8 +14,8 @@ from airtruth.identification import Options, identify
 from airtruth.logs.flight_log import FlightLog
 from airtruth.loop import identify_without_effects
 from airtruth.physics import short_period
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.readings import state_of
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm, SurfaceTerm
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.compensate import (
@@ -161,7 +161,7 @@ def test_record_less_the_response_is_the_linear_aircrafts():
 
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_recovers_the_derivatives(name):
-    names = list(PARAMETERS)
+    names = list(LONGITUDINAL.parameters)
     bent = identify(BENT, GTM, [name], Options()).to_frame()[names].to_numpy()
     straight = identify(STRAIGHT, GTM, [name], Options()).to_frame()[names].to_numpy()
     after = identify_without_effects([BENT], GTM, [name], KNOWN).to_frame()[names].to_numpy()
@@ -174,17 +174,29 @@ def test_every_method_recovers_the_derivatives(name):
 
 @pytest.mark.parametrize(("name", "tolerance"), [("iv-f1", 0.01), ("iv-f2", 0.01), ("frequency", 0.01)])
 def test_moment_derivatives_of_a_known_break_are_the_truth(name, tolerance):
-    after = identify_without_effects([BENT], GTM, [name], KNOWN).to_frame()[list(PARAMETERS)].to_numpy()
+    after = (
+        identify_without_effects([BENT], GTM, [name], KNOWN)
+        .to_frame()[list(LONGITUDINAL.parameters)]
+        .to_numpy()
+    )
     assert np.all(np.abs(after[:, [0, 3, 4, 5]] / TRUTH[[0, 3, 4, 5]] - 1.0) < tolerance)
 
 
 def test_derivatives_that_are_off_enter_by_the_share_of_the_motion():
     off = replace(KNOWN, conditions=(Condition(V, 1.1 * TRUTH),))
-    once = identify_without_effects([BENT], GTM, ["iv-f1"], off).to_frame()[list(PARAMETERS)].to_numpy()
+    once = (
+        identify_without_effects([BENT], GTM, ["iv-f1"], off)
+        .to_frame()[list(LONGITUDINAL.parameters)]
+        .to_numpy()
+    )
     error = np.abs(once[:, 3] / TRUTH[3] - 1.0)
     assert np.all(error < 0.03)
     again = replace(off, conditions=(Condition(V, once.mean(axis=0)),))
-    twice = identify_without_effects([BENT], GTM, ["iv-f1"], again).to_frame()[list(PARAMETERS)].to_numpy()
+    twice = (
+        identify_without_effects([BENT], GTM, ["iv-f1"], again)
+        .to_frame()[list(LONGITUDINAL.parameters)]
+        .to_numpy()
+    )
     assert np.all(np.abs(twice[:, 3] / TRUTH[3] - 1.0) < np.maximum(0.5 * error, 0.005))
 
 

@@ -10,16 +10,9 @@ from scipy.stats import multivariate_normal
 from airtruth.effects.effect import Prior
 from airtruth.physics.composition import TailGeometry, directions
 from airtruth.physics.motion import LATERAL
+from airtruth.tracing.inference.causes import Cause, causes_of
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
-from airtruth.tracing.selection.explanation import (
-    Cause,
-    CauseSet,
-    causes_of,
-    explain,
-    least_cost,
-    simplest_first,
-    size_of,
-)
+from airtruth.tracing.selection.explanation import CauseSet, explain, least_cost, simplest_first, size_of
 from airtruth.tracing.selection.release import DeclaredCauses, explained
 
 DECLARED = np.array([4.787, 31.7, 0.480, -1.785, -41.2, -1.787])

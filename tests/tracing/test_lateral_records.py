@@ -12,13 +12,8 @@ from airtruth.physics.motion import LATERAL
 from airtruth.quantity import Quantity
 from airtruth.simulation.probe_lateral import lateral_forces
 from airtruth.tracing.model.declared import UNCERTAINTY, declared_covariance
-from airtruth.tracing.model.lateral_plant import (
-    Reach,
-    lateral_trim,
-    linear_lateral,
-    looked_up_lateral,
-    probed_lateral,
-)
+from airtruth.tracing.model.plant import ForceTable, linear, looked_up
+from airtruth.tracing.model.probed import probed_lateral, trim_of
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import prepare, undo_input_sensors
@@ -37,13 +32,14 @@ PUBLISHED = np.array(
 """From an independent integration of the GTM's tables at 75 kt, 7000 ft."""
 HALF = GTM.constants.span_m / (2.0 * SPEED)
 ENDS = np.array([6.0 * DEG, 1.1 * HALF, 0.55 * HALF, 4.0 * DEG, 4.0 * DEG])
-REACH = Reach((3.5 * DEG, 8.0 * DEG), np.stack([-ENDS, ENDS], axis=1))
+NAMES = [signal.name for signal in LATERAL.signals]
+REACH = {name: (-end, end) for name, end in zip(NAMES, ENDS, strict=True)} | {"alpha": (3.5 * DEG, 8.0 * DEG)}
 LATERALLY = TraceOptions(motion="lateral")
 
 
 @pytest.fixture(scope="module")
 def plant():
-    return probed_lateral(GTM, lateral_trim(GTM, SPEED, DENSITY, ALTITUDE, 0.0), REACH)
+    return probed_lateral(GTM, trim_of(GTM, SPEED, DENSITY, ALTITUDE, 0.0, LATERAL), REACH)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +56,13 @@ def states(count, seed):
     """Random angles of attack and signals within the range of the tables."""
     rng = np.random.default_rng(seed)
     signals = ENDS * rng.uniform(-1.0, 1.0, (count, 5))
-    return rng.uniform(*REACH.alpha_rad, count), signals
+    return rng.uniform(*REACH["alpha"], count), signals
+
+
+def tables_at(plant, alpha, signals, pressure):
+    """Forces of the tables in states (states,) of the angle of attack and (states, signals)."""
+    known = dict(zip(NAMES, signals.T, strict=True))
+    return looked_up(plant, known | {"alpha": alpha}, np.full(len(alpha), pressure))
 
 
 def compared(plant, alpha, signals):
@@ -71,7 +73,7 @@ def compared(plant, alpha, signals):
     pressure = 0.5 * plant.trim.density_kg_m3 * plant.trim.airspeed_m_s**2
     return (
         flown,
-        looked_up_lateral(plant, alpha, signals, np.full(len(alpha), pressure)),
+        tables_at(plant, alpha, signals, pressure),
         np.ptp(flown, axis=0),
     )
 
@@ -117,7 +119,7 @@ def test_slopes_of_the_tables_at_the_trim_are_the_derivatives(plant):
     for number in range(5):
         ends = np.tile(plant.trim_signals, (2, 1))
         ends[:, number] += [-step[number], step[number]]
-        low, high = looked_up_lateral(plant, np.full(2, plant.trim_alpha_rad), ends, np.ones(2))
+        low, high = tables_at(plant, np.full(2, plant.trim_alpha_rad), ends, 1.0)
         slope = (high - low) / (2.0 * step[number] * scale)
         np.testing.assert_allclose(slope, plant.derivatives.reshape(3, 5)[:, number], atol=1e-3)
 
@@ -126,18 +128,32 @@ def test_an_aircraft_in_trim_stays_there(plant):
     """The air holds the weight's side component, and no moment is left."""
     at = plant.trim
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    force = looked_up_lateral(plant, np.array([at.alpha_rad]), plant.trim_signals[None], np.array([pressure]))
+    force = tables_at(plant, np.array([at.alpha_rad]), plant.trim_signals[None], pressure)
     assert np.abs(force).max() < 1e-6
+
+
+def test_tables_and_constants_that_the_axes_do_not_address_are_refused(plant):
+    """A compiled kernel reads past the end of an array."""
+    table = plant.tables[0]
+    with pytest.raises(ValueError, match="table over alpha, beta: values have the shape"):
+        ForceTable(table.signals, table.axes, table.values[:-1])
+    with pytest.raises(ValueError, match="constant has the shape"):
+        replace(plant, constant=plant.constant[:-1])
+    with pytest.raises(ValueError, match="axis alpha of a table"):
+        replace(
+            plant,
+            tables=(table, ForceTable(table.signals, (table.axes[0][:-1], table.axes[1]), table.values[:-1])),
+        )
 
 
 def test_the_linear_model_is_in_trim_at_the_records_own_start():
     derivatives, start, phi = PUBLISHED.ravel(), np.array([0.02, 0.0, 0.0, 0.01, -0.03]), 0.05
     pressure = 0.5 * DENSITY * SPEED**2
-    plant = linear_lateral(GTM, derivatives, pressure, start, phi, 0.1)
+    weight = GTM.constants.mass_kg * G0 * np.cos(0.1) * np.sin(phi)
+    plant = linear(GTM, LATERAL, derivatives, pressure, start, np.array([-weight, 0.0, 0.0]))
     alpha = np.array([0.1, 0.1])
     moved = start + np.array([0.0, 0.01, 0.02, 0.0, 0.03])
-    at_rest, away = looked_up_lateral(plant, alpha, np.stack([start, moved]), np.full(2, pressure))
-    weight = GTM.constants.mass_kg * G0 * np.cos(0.1) * np.sin(phi)
+    at_rest, away = tables_at(plant, alpha, np.stack([start, moved]), pressure)
     np.testing.assert_allclose(at_rest, [-weight, 0.0, 0.0], atol=1e-9)
     c = GTM.constants
     scale = pressure * c.wing_area_m2 * np.array([1.0, c.span_m, c.span_m])

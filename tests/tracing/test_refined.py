@@ -3,7 +3,7 @@
 import pytest
 
 from airtruth import aircraft as planes
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.resolution import linear_point
 from airtruth.simulation.simulator import Condition
 from airtruth.tracing import trace
@@ -24,7 +24,7 @@ def refined(tmp_path_factory):
 def apparent(declared):
     """Derivatives that the trial flew, over the declared mass, inertia and CG (Etkin and Reid, 1996, ch. 2)."""
     body = undeclared.trial("f").body
-    flown = {name: declared[name] * (1.0 + body.derivatives[name]) for name in PARAMETERS}
+    flown = {name: declared[name] * (1.0 + body.derivatives[name]) for name in LONGITUDINAL.parameters}
     moved = {f"CL{s}": flown[f"CL{s}"] / body.mass for s in ("alpha", "q", "de")}
     moved |= {
         f"Cm{s}": (flown[f"Cm{s}"] + body.cg * flown[f"CL{s}"]) / body.inertia for s in ("alpha", "q", "de")
@@ -34,7 +34,7 @@ def apparent(declared):
 
 def test_refined_derivatives_are_those_that_were_flown(refined):
     assert refined.verdict == "none"
-    assert set(refined.refined) == set(PARAMETERS)
+    assert set(refined.refined) == set(LONGITUDINAL.parameters)
     truth = apparent(refined.derivatives.declared)
     off = {name: (r.estimate - truth[name]) / r.std for name, r in refined.refined.items()}
     assert sum(x**2 for x in off.values()) < 16.81  # chi-square of six degrees at 1 %

@@ -10,16 +10,17 @@ from airtruth import aircraft
 from airtruth.aircraft.write import write_aircraft
 from airtruth.channels import SIGNALS
 from airtruth.logs.flight_log import FlightLog
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.trim import trim
 from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.model.plant import probed
+from airtruth.tracing.model.plant import looked_up
+from airtruth.tracing.model.probed import probed
 from airtruth.tracing.model.reading import read
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.model.remainder import looked_up, remainders
+from airtruth.tracing.model.remainder import remainders
 from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.model.settings import initial_per_record, settings_of
 from airtruth.units import DEG
@@ -61,20 +62,20 @@ def late(gtm, paper_condition, tmp_path_factory):
 
 def test_tables_are_read_trilinearly(plant):
     rng = np.random.default_rng(1)
-    axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
+    (table,) = plant.tables
+    axes = table.axes
     x = np.stack([rng.uniform(axis[0], axis[-1], 50) for axis in axes], axis=1)
     pressure = rng.uniform(500.0, 1500.0, 50)
-    other = pressure[:, None] * RegularGridInterpolator(axes, plant.values)(x)
+    other = pressure[:, None] * RegularGridInterpolator(axes, table.values)(x)
     other += RegularGridInterpolator(axes[:1], plant.constant)(x[:, :1])
-    np.testing.assert_allclose(
-        np.stack(looked_up(plant, *x.T, pressure), axis=1), other, rtol=1e-10, atol=1e-9
-    )
+    signals = dict(zip(table.signals, x.T, strict=True))
+    np.testing.assert_allclose(looked_up(plant, signals, pressure), other, rtol=1e-10, atol=1e-9)
 
 
 def test_an_aircraft_that_its_tables_hold_has_no_remainder(gtm, paper_trim, plant):
     """The GTM's forces are those of its state; the tables of whole degrees leave 1e-3 of the doublet's moment."""
     found = remainders([record_of(gtm, paper_trim)], [plant])[0]
-    moment = abs(plant.derivatives[PARAMETERS.index("Cmde")]) * 1.5 * DEG
+    moment = abs(plant.derivatives[LONGITUDINAL.parameters.index("Cmde")]) * 1.5 * DEG
     assert np.abs(found[1]).max() < 0.02 * moment
     assert np.abs(found[0]).max() < 0.02 * moment
 
@@ -86,7 +87,7 @@ def test_tables_that_the_declared_model_flies_beyond_leave_no_remainder(gtm, pap
     narrow, wide = plant_of(gtm, paper_trim, 1.0 * DEG), plant_of(gtm, paper_trim, 12.0 * DEG)
     assert np.ptp(signals.y[:, 0]) > 1.5 * np.ptp(narrow.alpha_rad)
     found, right = remainders([signals, signals], [narrow, wide])
-    moment = abs(plant.derivatives[PARAMETERS.index("Cmde")]) * 4.0 * DEG
+    moment = abs(plant.derivatives[LONGITUDINAL.parameters.index("Cmde")]) * 4.0 * DEG
     assert np.abs(found - right).max() < 0.02 * moment
 
 
@@ -101,7 +102,7 @@ def test_a_delay_of_the_model_is_the_remainder(late):
         points, fine, signals.elevator_rad
     )
     for row, name in enumerate(("CLde", "Cmde")):
-        slope = plant.derivatives[PARAMETERS.index(name)]
+        slope = plant.derivatives[LONGITUDINAL.parameters.index(name)]
         error = found[row] - slope * moved
         assert error.std() < 0.1 * abs(slope) * moved.std(), name
 

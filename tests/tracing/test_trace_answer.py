@@ -15,7 +15,6 @@ from airtruth import aircraft as planes
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing import TraceAnswer, TraceOptions, trace
 from airtruth.tracing.answer import ANOMALY_LEVEL
 
@@ -97,7 +96,7 @@ def test_contract_3(name, flown, traced):
     assert len(a["candidates"]) == len(library)
     declared = a["declared_model"]
     assert declared["consistent"] == (a["verdict"] == "none")
-    assert set(declared["shifts"]) == set(PARAMETERS)
+    assert set(declared["shifts"]) == set(LONGITUDINAL.parameters)
     assert sum(x["weight"] for x in a["alternatives"]) == pytest.approx(1.0, abs=0.02)
     assert set(a["inclusion"]) == {name for x in a["alternatives"] for name in x["effects"]}
     assert a["confirmed"] is (True if a["effects"] else None)
@@ -111,7 +110,7 @@ def test_contract_3(name, flown, traced):
             assert set(part) == {"free_run", "innovation"}
             assert all(set(found) == CHANNELS for found in part.values())
     for which in ("declared", "before", "after"):
-        assert set(a["derivatives"][which]) == set(PARAMETERS)
+        assert set(a["derivatives"][which]) == set(LONGITUDINAL.parameters)
     if declared["consistent"]:
         assert set(a["detectability"]) >= {c["name"] for c in a["candidates"] if c["testable"]}
         for key, value in a["detectability"].items():

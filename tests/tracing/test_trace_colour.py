@@ -20,10 +20,10 @@ from airtruth.tracing.calibration.noise_colour import (
     share_slopes,
     with_coloured_noise,
 )
+from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.release import DeclaredCauses
 from airtruth.units import DEG
 
 SHARES = SHORT_PERIOD.common.colour_shares

@@ -12,7 +12,8 @@ import trace_flights as flights
 from airtruth import aircraft as planes
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.model.plant import declared_derivatives, trim_of
+from airtruth.tracing.model.plant import declared_derivatives
+from airtruth.tracing.model.probed import trim_of
 from airtruth.tracing.prepare import prepare
 from airtruth.tracing.update import write_update
 

@@ -27,7 +27,7 @@ def forces(plant, alpha, surface, qhat):
         for j in (0, 1):
             for n in (0, 1):
                 weights = [s if k else 1.0 - s for s, k in zip(share, (i, j, n), strict=True)]
-                f += math.prod(weights) * plant.values[i, j, n]
+                f += math.prod(weights) * plant.tables[0].values[i, j, n]
     return f
 
 
@@ -77,12 +77,12 @@ def test_nonlinear_free_run_against_dop853(bolted):
         v, vg = speed(t), ground(t)
         qbar = 0.5 * density(t) * v * v
         alpha = theta(t) - math.asin(vg * math.sin(theta(t) - alpha_ground) / v)
-        surface = plant.neutral_elevator_rad + factor * (elevator(t) - plant.neutral_elevator_rad)
+        surface = plant.neutral_rad[0] + factor * (elevator(t) - plant.neutral_rad[0])
         qhat = q * c.chord_m / (2.0 * v)
         share = 0.5 * (alpha + 1.0)  # of the one cell from -1 to 1 rad
         constant = (1.0 - share) * plant.constant[0] + share * plant.constant[1]
-        fx, fz, fm = qbar * forces(plant, alpha, surface, qhat) + constant + 0.04 * plant.engine
-        states = np.array([alpha - plant.trim_alpha_rad, qhat, surface - plant.trim_elevator_rad])
+        fx, fz, fm = qbar * forces(plant, alpha, surface, qhat) + constant + 0.04 * plant.power.constant
+        states = np.array([alpha - plant.trim_alpha_rad, qhat, surface - plant.trims["elevator"]])
         lift = per_record[SHORT_PERIOD.per_record.trim.start] + common[LONGITUDINAL.row("CL")] @ states
         moment = (
             per_record[SHORT_PERIOD.per_record.offsets.stop - 1] + common[LONGITUDINAL.row("Cm")] @ states
@@ -91,7 +91,7 @@ def test_nonlinear_free_run_against_dop853(bolted):
         fm += (
             qbar * c.wing_area_m2 * c.chord_m * moment
             - cg * c.chord_m * fz  # a CG aft of the forces' old point: nose-up for an upward force
-            + (plant.thrust[0] + plant.thrust[1] * qbar) * arm
+            + (plant.power.thrust[0] + plant.power.thrust[1] * qbar) * arm
         )
         m = c.mass_kg * mass
         turn = (fz * math.cos(alpha) - fx * math.sin(alpha)) / (m * vg)

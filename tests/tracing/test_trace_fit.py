@@ -315,7 +315,7 @@ def test_a_curvature_is_found_whatever_angle_it_is_about(about, slope):
     rng = np.random.default_rng(81)
     bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 10.0, about),))
     plant = tr.plant()
-    plant = replace(plant, alpha_rad=plant.alpha_rad + 0.1, trim_alpha_rad=0.1)
+    plant = tr.about(plant, 0.1)
     common, per_record = tr.still()
     per_record[SHORT_PERIOD.per_record.index("alpha0")], per_record[SHORT_PERIOD.per_record.trim.start] = (
         0.1,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trace_records as tr
 
 from airtruth import aircraft as planes
 from airtruth.effects.registry import EFFECTS
@@ -12,7 +13,6 @@ from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import ParameterEstimate
 from airtruth.tracing.intervals import at_measured_alpha
-from airtruth.tracing.model.plant import linear
 from airtruth.tracing.prepare import prepare
 from airtruth.units import G0
 
@@ -44,17 +44,19 @@ def test_a_single_record_is_one_record_in_two_parts():
 def test_the_curves_of_the_linear_model_are_those_of_its_derivatives():
     """At its trim: lift equals weight, no moment; slopes CLalpha, Cmalpha, CLde and Cmde."""
     gtm = planes.load("gtm")
-    plant = linear(gtm, DERIVATIVES, 43.0, 0.99, 0.1, 0.01)
+    plant = tr.plant(DERIVATIVES, 0.1, 0.01, 43.0)
     c = gtm.constants
-    lift = -plant.over_alpha[:, 1] / c.wing_area_m2
-    moment = plant.over_alpha[:, 2] / (c.wing_area_m2 * c.chord_m)
-    weight = c.mass_kg * G0 / (0.5 * 0.99 * 43.0**2 * c.wing_area_m2)
-    np.testing.assert_allclose(np.interp(0.0, plant.alpha_rad, lift), weight, rtol=1e-12)
-    np.testing.assert_allclose(np.interp(0.0, plant.alpha_rad, moment), 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.diff(lift) / np.diff(plant.alpha_rad), DERIVATIVES[0])
-    np.testing.assert_allclose(np.diff(moment) / np.diff(plant.alpha_rad), DERIVATIVES[3])
-    across = plant.over_elevator[:, 2] / (c.wing_area_m2 * c.chord_m)
-    np.testing.assert_allclose(np.diff(across) / np.diff(plant.elevator_rad), DERIVATIVES[5])
+    alpha, forces = plant.along("alpha")
+    lift = -forces[:, 1] / c.wing_area_m2
+    moment = forces[:, 2] / (c.wing_area_m2 * c.chord_m)
+    weight = c.mass_kg * G0 / (0.5 * tr.DENSITY * 43.0**2 * c.wing_area_m2)
+    np.testing.assert_allclose(np.interp(0.0, alpha, lift), weight, rtol=1e-12)
+    np.testing.assert_allclose(np.interp(0.0, alpha, moment), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.diff(lift) / np.diff(alpha), DERIVATIVES[0])
+    np.testing.assert_allclose(np.diff(moment) / np.diff(alpha), DERIVATIVES[3])
+    elevator, forces = plant.along("elevator")
+    across = forces[:, 2] / (c.wing_area_m2 * c.chord_m)
+    np.testing.assert_allclose(np.diff(across) / np.diff(elevator), DERIVATIVES[5])
 
 
 def test_angles_of_the_linear_model_are_stated_from_zero():

@@ -245,7 +245,7 @@ def test_the_score_of_a_curvature_is_that_of_a_refit_beside_a_free_slope():
     rng = np.random.default_rng(92)
     bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 7.0, 0.0),))
     plant = tr.plant()
-    plant = replace(plant, alpha_rad=plant.alpha_rad + 0.1, trim_alpha_rad=0.1)
+    plant = tr.about(plant, 0.1)
     common, per_record = tr.still()
     per_record[SHORT_PERIOD.per_record.index("alpha0")], per_record[SHORT_PERIOD.per_record.trim.start] = (
         0.1,

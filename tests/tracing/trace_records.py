@@ -10,15 +10,16 @@ from scipy.signal import lfilter
 
 from airtruth import aircraft
 from airtruth.physics import short_period
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
-from airtruth.tracing.model.plant import linear
+from airtruth.tracing.model.plant import Engines, linear
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord
 from airtruth.tracing.model.response import filter_inputs, filter_model, respond
 from airtruth.tracing.model.settings import initial_per_record, settings_of
-from airtruth.units import DEG
+from airtruth.units import DEG, G0
 
 GTM = aircraft.load("gtm")
 C = GTM.constants
@@ -34,7 +35,9 @@ CORNERS, LEADS = np.array([2.1, 21.0, 217.0]), np.array([0.58, 0.84, 1.39])
 
 
 def plant(derivatives=TRUTH, alpha=0.0, elevator=0.0, v=V):
-    return linear(GTM, derivatives, v, DENSITY, alpha, elevator)
+    weight = np.array([0.0, -C.mass_kg * G0, 0.0])
+    start = np.array([alpha, 0.0, elevator])
+    return linear(GTM, LONGITUDINAL, np.asarray(derivatives), 0.5 * DENSITY * v**2, start, weight)
 
 
 def doublet(t, amplitude=2.0 * DEG, start=0.5, step=0.4):
@@ -257,10 +260,18 @@ def close(found, expected, tolerance):
     assert (error < tolerance).all(), error
 
 
+def about(plant_, alpha):
+    """A plant of the linear model whose tables count the angle of attack from zero, and its trim lies at ``alpha``."""
+    (table,) = plant_.tables
+    axes = (table.axes[0] + alpha, *table.axes[1:])
+    return replace(plant_, tables=(replace(table, axes=axes),), trims={**plant_.trims, "alpha": alpha})
+
+
 def curved():
     """A plant whose tables are one cell, so that forces are smooth products of the three signals."""
     rng = np.random.default_rng(3)
-    base = plant().values
+    (table,) = plant().tables
+    base = table.values
     values = base * (1.0 + 0.2 * rng.standard_normal(base.shape))
     values[..., 0] = -0.05 + 0.02 * rng.standard_normal((2, 2, 2))
     values[..., 1] = base[..., 1] + 0.3 * rng.standard_normal((2, 2, 2))
@@ -268,12 +279,9 @@ def curved():
     axis = np.array([-1.0, 1.0])
     return replace(
         plant(),
-        elevator_rad=axis,
-        values=values,
+        tables=(replace(table, axes=(axis, axis, axis), values=values),),
         constant=np.array([[30.0, -4.0, 1.5], [26.0, -7.0, 2.5]]),
-        engine=np.array([28.0, -5.0, 1.8]),
-        trim_alpha_rad=0.02,
-        trim_elevator_rad=-0.01,
-        neutral_elevator_rad=-0.004,
-        thrust=np.array([25.0, 0.02]),
+        power=Engines(np.array([28.0, -5.0, 1.8]), np.array([25.0, 0.02])),
+        trims={"alpha": 0.02, "elevator": -0.01, "qhat": 0.0},
+        neutral_rad=np.array([-0.004]),
     )

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from airtruth.identification import Options, identify, require_mergeable, settings_of, write_estimates
 from airtruth.logs import manifest
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting import report
 from airtruth.simulation.campaign.run import fly
 from airtruth.simulation.new_aircraft import estimated_derivatives
@@ -40,7 +40,7 @@ def closed_loop() -> dict[str, Any]:
         {"method": method, "derivative": name, "declared": 1.0, "before": 1.1, "before_error": 0.1, "after": 1.0,
          "after_error": 0.1, "runs_before": 3, "runs_after": 3}
         for method in ("ls", "iv-f1")
-        for name in PARAMETERS
+        for name in LONGITUDINAL.parameters
     ]  # fmt: skip
     treatments = [{"effect": "elevator_delay", "kind": "replaced", "sentence": "the elevator is delayed"}]
     return {"trace": trace(), "treatments": treatments, "estimates": rows}

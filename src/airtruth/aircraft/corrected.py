@@ -74,7 +74,7 @@ def write_corrected(
     Parameters
     ----------
     aircraft : an aircraft without a JSBSim model: geometry, mass, actuator, sensors, and dynamics, which the model takes.
-    derivatives : all of `airtruth.physics.short_period.PARAMETERS` about the CG, without the change [1/rad].
+    derivatives : all of ``LONGITUDINAL.parameters`` about the CG, without the change [1/rad].
     at : trim at which the changed aircraft flies.
     change : terms to add, alpha counted from zero; terms in the air are left out.
     out_folder : folder to write, new or empty; the JSBSim model takes its name.

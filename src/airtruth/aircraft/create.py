@@ -23,7 +23,7 @@ from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.atmosphere import air_density
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.quantity import LARGEST, Quantity
 
 _MOST_ALPHA_RAD: Final = 0.7
@@ -88,7 +88,7 @@ def from_estimates(estimates: pd.DataFrame, method: str | None = None) -> dict[s
         raise ConfigurationError(f"estimates: no run of {chosen} converged")
     source = f"{chosen}, {len(good)} run{'s' if len(good) > 1 else ''}"
     derivatives = {}
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         value, std = good[name].to_numpy(), good[f"{name}_std"].to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):  # diverged estimates
             scatter = float(value.std(ddof=1)) if len(value) > 1 else 0.0
@@ -111,7 +111,7 @@ def write_new(
     Parameters
     ----------
     aircraft : source of geometry, mass, actuator and sensors.
-    derivatives : all of `airtruth.physics.short_period.PARAMETERS` about the CG [1/rad].
+    derivatives : all of ``LONGITUDINAL.parameters`` about the CG [1/rad].
     at : trim about which they hold.
     out_folder : folder to write, new or empty; the aircraft and its model take its name.
     note : added to the heads of both files.
@@ -153,7 +153,11 @@ def _file(source: AircraftFile, name: str, derivatives: Mapping[str, Quantity]) 
         throttle=ThrottleProperties(),
         rotary_gust="aero/gust/q-rad_sec",
     )
-    changed = {"name": name, "jsbsim": model, "derivatives": {k: derivatives[k] for k in PARAMETERS}}
+    changed = {
+        "name": name,
+        "jsbsim": model,
+        "derivatives": {k: derivatives[k] for k in LONGITUDINAL.parameters},
+    }
     kept = {k: getattr(source, k) for k in source.model_fields_set if k != "schema_"}
     return AircraftFile.model_construct(**kept | changed)
 
@@ -161,14 +165,14 @@ def _file(source: AircraftFile, name: str, derivatives: Mapping[str, Quantity]) 
 def _checked(derivatives: Mapping[str, Quantity], at: TrimPoint) -> dict[str, float]:
     """Values of all six derivatives [1/rad]."""
     for name in derivatives:
-        if name not in PARAMETERS:
-            raise ConfigurationError(f"derivative {name!r}: {choices(name, PARAMETERS)}")
-    missing = [name for name in PARAMETERS if name not in derivatives]
+        if name not in LONGITUDINAL.parameters:
+            raise ConfigurationError(f"derivative {name!r}: {choices(name, LONGITUDINAL.parameters)}")
+    missing = [name for name in LONGITUDINAL.parameters if name not in derivatives]
     if missing:
         raise ConfigurationError(
             f"derivatives lack {', '.join(missing)}; state them in [derivatives] of aircraft.toml, or give estimates"
         )
-    values = {name: derivatives[name].value for name in PARAMETERS}
+    values = {name: derivatives[name].value for name in LONGITUDINAL.parameters}
     wrong = [name for name, value in values.items() if not np.isfinite(value)]
     if wrong:
         raise ConfigurationError(f"derivative {wrong[0]} is not a finite number")

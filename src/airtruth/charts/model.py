@@ -154,7 +154,7 @@ class Area:
 
 
 Item = Line | Area | Mark | Bar | Rule | Band
-"""What a legend has entries of."""
+"""Marks that a legend has entries of."""
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def _scaled(name: str, factor: float) -> Change:
 
 
 def _setting(name: str, stated: Stated | None, unit: str = "", sign: bool = False, scale: float = 1.0) -> str:
-    """What to write in the mapping, beside what it states."""
+    """Lines to add to the mapping."""
     parts = []
     if unit and (stated is None or unit != stated.unit):
         instead = f' in place of "{stated.unit}"' if stated is not None else ""

@@ -198,7 +198,7 @@ def _nothing(name: str, channels: tuple[str, ...], runs: Runs) -> Relation:
 
 
 def _surface(runs: Runs, name: str, surfaces: tuple[str, ...]) -> list[Relation]:
-    """What a surface does to its rate, the other causes held: its sign, and its size against the derivative that balances it."""
+    """Effect of a surface on its rate, the other causes held: its sign, and its size against the derivative that balances it."""
     rate = RATES[name]
     others = [n for n in surfaces if n != name]
     sideslip = [n for n in ("beta_rad",) if n in runs.channels]

@@ -105,7 +105,7 @@ class Explanation:
 
     @property
     def cure(self) -> str:
-        """What to write in the mapping, for either."""
+        """Lines to write in the mapping, for either."""
         words = [one.cure for one in (self.correction, self.rival) if one is not None]
         return "; or ".join(words)
 

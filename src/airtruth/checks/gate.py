@@ -112,7 +112,7 @@ class Admitted:
         return tuple(fault.sentence for fault in self.faults if fault.certain)
 
     def remarks(self, *codes: str) -> tuple[str, ...]:
-        """What a result records beside its answer: runs that were left out, and uncertain faults of some codes."""
+        """Record of the gate beside an answer: runs that were left out, and uncertain faults of some codes."""
         return (*self.left_out, *(f.sentence for f in self.faults if f.code in codes and not f.certain))
 
 

@@ -1,4 +1,4 @@
-"""What a fit of instrument errors leaves of the surfaces' motion: the absolute test, of all and of each equation."""
+"""Motion of the surfaces that a fit of instrument errors leaves: the absolute test, of all and of each equation."""
 
 from __future__ import annotations
 

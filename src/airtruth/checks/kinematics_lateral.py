@@ -291,7 +291,7 @@ def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
 
 
 def _of_arms(findings: Sequence[Finding], known: Mapping[str, float]) -> list[str]:
-    """What an arm is measured from."""
+    """Origin of an arm, in words."""
     if not any(f.name in ARMS for f in findings):
         return []
     if ARMS[1] in known:
@@ -305,7 +305,7 @@ def _of_arms(findings: Sequence[Finding], known: Mapping[str, float]) -> list[st
 
 
 def _of_gusts(findings: Sequence[Finding]) -> list[str]:
-    """What moving air hides."""
+    """Errors that moving air hides."""
     hidden = [f.name for f in findings if f.name in BY_GUSTS and f.state == "not shown"]
     if not hidden:
         return []

@@ -138,7 +138,7 @@ class InstrumentError:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """What a kinematic check knows of a motion; everything else of the check is common to all.
+    """The part of a kinematic check that depends on the motion; everything else of the check is common to all.
 
     Attributes
     ----------

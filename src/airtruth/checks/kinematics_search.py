@@ -289,7 +289,7 @@ def _improbability(problem: Problem, one: Fit, usual: Mapping[str, float]) -> fl
 
 @dataclass(frozen=True)
 class _Scale:
-    """What counts as noise: the weight itself, or the motion that the chosen set leaves.
+    """Level that counts as noise: the weight itself, or the motion that the chosen set leaves.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a kinematic check says where alpha was computed from the channels that it would be compared with."""
+"""Notes of a kinematic check where alpha was computed from the channels that it would be compared with."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COMPUTED: Final = (
 )
 """The first sentence of a check without a vane."""
 REMEDY: Final = "Compare the airspeed with ground speed on opposite headings and az_m_s2 with gravity at rest, or record a vane."
-"""What shows the errors that remain."""
+"""Advice on finding the errors that remain."""
 
 
 def untestable(run_ids: Sequence[str]) -> CheckResult:

@@ -26,7 +26,7 @@ def left_out(run_ids: Sequence[str], count: int, rest: int, reason: str) -> str:
 
 
 def evidence(test: Relation, row: int = -1) -> str:
-    """What a test measured and what physics requires, for one run, or with -1 for all together."""
+    """The measured and the required value of a test, for one run, or with -1 for all together."""
     f = [float(x) for x in test.figures[row]]
     name = test.channels[0]
     if test.name == "range":

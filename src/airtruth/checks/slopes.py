@@ -19,6 +19,8 @@ from airtruth.units import DEG, G0
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
 
+CAUSES: Final = ("alpha_rad", "elevator_rad", "q_rad_s")
+"""Channels of the motion in pitch."""
 AXIAL_SLOPE: Final = (1.0, 0.4)
 """Slope of ax on alpha and its tolerance, as shares of gravity [-].
 
@@ -45,22 +47,24 @@ TYPICAL: Final = {"CLalpha": 4.5, "Cmde": -1.2}
 
 
 def slopes_near_trim(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
-    """Tests of aerodynamic slopes in the runs that keep to one trim; the other runs have no distance."""
+    """Tests of aerodynamic slopes in the runs that keep to one trim; the other runs have no distance.
+
+    A run that yaws more than it pitches is none of them: sideslip and roll then move alpha and the pitching moment.
+    """
 
     def keeps(c: Channels, dt_s: float) -> Array:
         speed, alpha = c["airspeed_m_s"], c["alpha_rad"]
         most_speed, most_alpha = NEAR_TRIM
-        return np.asarray(
-            (np.ptp(speed, axis=1) < most_speed * np.abs(speed.mean(axis=1)))
-            & (np.ptp(alpha, axis=1) < most_alpha)
-        )
+        slow = np.ptp(speed, axis=1) < most_speed * np.abs(speed.mean(axis=1))
+        pitch, yaw = (np.ptp(c.get(name, c[CAUSES[-1]]), axis=1) for name in (CAUSES[-1], "r_rad_s"))
+        return np.asarray(slow & (np.ptp(alpha, axis=1) < most_alpha) & (yaw <= pitch))
 
     near = runs.each(keeps).astype(np.bool_)
     rows = np.flatnonzero(near) if near.any() else np.arange(len(near))
     chosen = runs.some(rows)
     result = [] if aircraft is None else _aerodynamic_tests(chosen, aircraft)
     if "ax_m_s2" in runs.channels:
-        regressors = [chosen.spectra(_channel(n)) for n in ("alpha_rad", "elevator_rad", "q_rad_s")]
+        regressors = [chosen.spectra(_channel(n)) for n in CAUSES]
         axial = chosen.spectra(_channel("ax_m_s2"))
         result.append(_axial_test(regress(axial, np.stack(regressors, axis=1), lines=chosen.lines())))
     return [_spread(test, rows, near) for test in result]
@@ -93,7 +97,7 @@ def _axial_test(factors: Factors) -> Relation:
     distance = (value - usual) ** 2 / (std**2 + tolerance**2) * (factors.share > AXIAL_SHARE)
     figures = np.stack([value, std, factors.share], axis=1)
     distance = finite(distance)
-    channels = ("ax_m_s2", "alpha_rad", "elevator_rad", "q_rad_s")
+    channels = ("ax_m_s2", *CAUSES)
     return Relation("ax_slope", channels, distance, figures, informed_everywhere(distance))
 
 
@@ -110,7 +114,7 @@ def _aerodynamic_tests(runs: Runs, aircraft: Aircraft) -> list[Relation]:
 
     pressure, lines = runs.each(dynamic), runs.lines()
     pressure = np.append(pressure, pressure.mean())
-    causes = [runs.spectra(_channel(n)) for n in ("alpha_rad", "elevator_rad", "q_rad_s")]
+    causes = [runs.spectra(_channel(n)) for n in CAUSES]
     lift = regress(runs.spectra(_channel("az_m_s2")), np.stack(causes, axis=1), lines=lines)
     causes = [runs.spectra(_integral(n)) for n in ("elevator_rad", "alpha_rad", "q_rad_s")]
     control = regress(runs.spectra(_channel("q_rad_s")), np.stack(causes, axis=1), lines=lines)

@@ -1,4 +1,4 @@
-"""What the mapping of an imported log states of its channels."""
+"""Statements of the mapping of an imported log about its channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands let a child process compile where the cache of kernels is empty."""
+"""Kernels that a child process compiles for the commands where the cache is empty."""
 
 from __future__ import annotations
 

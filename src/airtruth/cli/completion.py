@@ -47,11 +47,11 @@ def complete_effect(incomplete: str) -> Iterator[str]:
 
 def complete_derivative(incomplete: str) -> Iterator[str]:
     """Names of the derivatives; after a comma the next one."""
-    from airtruth.physics.short_period import PARAMETERS
+    from airtruth.physics.motion import LONGITUDINAL
 
     before, comma, last = incomplete.rpartition(",")
     stated = before.split(",")
-    return (before + comma + name for name in _beginning(last, PARAMETERS) if name not in stated)
+    return (before + comma + name for name in _beginning(last, LONGITUDINAL.parameters) if name not in stated)
 
 
 def complete_example(incomplete: str) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""What a command checks before its imports of seconds: names, and whether the files exist."""
+"""Checks of a command before its imports of seconds: names, and whether the files exist."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def plan(
         ),
     ] = None,
     amplitude_deg: Annotated[
-        float, typer.Option(help="Largest deviation of the elevator from its trim [deg].")
+        float, typer.Option(help="Largest deviation of the surfaces from their trim [deg].")
     ] = 2.0,
     rate_deg_s: Annotated[
         float | None, typer.Option(help="Largest rate of the surface [deg/s]; default: that of the servo.")

@@ -237,7 +237,7 @@ def _configure() -> None:
 
 @contextmanager
 def _processes(address: Address) -> Iterator[Any]:
-    """What a client connects to: processes on this machine that end with the context, or the scheduler's URL."""
+    """Address for a client: processes on this machine that end with the context, or the scheduler's URL."""
     if address.local is None:
         yield address.scheduler
         return

@@ -23,7 +23,7 @@ from airtruth.design.flight import fitted_of, model_of
 from airtruth.design.narrow_result import Quantity
 from airtruth.design.separation import Model, beyond, flown_by, refitted
 from airtruth.effects.increment import SIGNAL_NAMES, Increment, Memory, Shape, increment
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.tracing.accepted import IncrementTable
@@ -47,7 +47,7 @@ _SPREAD: Final = 0.3
 """Relative standard deviation of the size of an increment in the draws [-] (judgement, as of an effect)."""
 _MOST: Final = 1.5
 """Largest draw of it, in standard deviations [-] (judgement: no increment changes its sign)."""
-_FREE: Final = tuple(range(len(PARAMETERS)))
+_FREE: Final = tuple(range(len(LONGITUDINAL.parameters)))
 """Derivatives that the declaration does not constrain."""
 
 
@@ -88,7 +88,6 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     factor = next((name for name, stated in SIGNAL_NAMES.items() if stated == accepted.by), "")
     memory = next((Memory(s.kind, s.time_s, s.damping, s.half_width) for s in accepted.states), None)
     table = accepted.table
-    trims = {"alpha": plant.trim_alpha_rad, "elevator": plant.trim_elevator_rad}
     at = np.zeros(1) if table is None else _points(table)
     shape = Shape(
         acts_on="Cm" if accepted.acts_on == "Cm" else "CL",
@@ -96,7 +95,7 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
         low=float(at[0]),
         high=float(at[-1]),
         cells=len(at) - 1,
-        trim=trims.get(signal, 0.0) if table is None else table.origin,
+        trim=plant.trims.get(signal, 0.0) if table is None else table.origin,
         memory=memory,
         factor=factor,
         factor_trim=accepted.by_at,
@@ -138,7 +137,7 @@ class BandQuestion:
 
     @property
     def title(self) -> str:
-        """What the input does."""
+        """The purpose of the input."""
         return "the input that narrows the band of " + " and of ".join(e.variant for e in self.accepted)
 
     def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> Band:

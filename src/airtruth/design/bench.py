@@ -25,7 +25,8 @@ from airtruth.simulation.resolution import trimmed_and_linear
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing.conditions import gust_length_m
-from airtruth.tracing.model.plant import Plant, probed
+from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.probed import probed
 from airtruth.tracing.model.reading import read
 from airtruth.tracing.model.records import TraceRecord
 

@@ -1,4 +1,4 @@
-"""What every planned flight has in common: options, flight conditions to compare, air, and the campaign that flies an input."""
+"""Common parts of every planned flight: options, flight conditions to compare, air, and the campaign that flies an input."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _require_open_loop(campaign: Campaign) -> None:
 def best_condition(
     campaign: Campaign, made: Callable[[Condition], T], value: Callable[[T], float], told: Callable[[T], None]
 ) -> T:
-    """What is made at the flight condition of the largest value.
+    """The object that is made at the flight condition of the largest value.
 
     Parameters
     ----------

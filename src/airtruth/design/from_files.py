@@ -46,7 +46,7 @@ _LOG_HZ: Final = 50.0
 
 @dataclass(frozen=True)
 class Stated:
-    """What a user states of the question; where it is nothing, a trace asks.
+    """The question as a user states it; without a statement, a trace asks.
 
     Attributes
     ----------

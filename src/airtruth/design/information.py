@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LinearExperiment:
-    """What a record of the linear short period has besides its elevator.
+    """Properties of a record of the linear short period besides its elevator.
 
     Attributes
     ----------

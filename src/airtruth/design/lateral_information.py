@@ -28,7 +28,7 @@ _ZERO: Final = -np.inf
 
 @dataclass(frozen=True)
 class LateralExperiment:
-    """What a record of the linear lateral-directional motion has besides its aileron and rudder.
+    """Properties of a record of the linear lateral-directional motion besides its aileron and rudder.
 
     The model is exact: no noise drives p' and r', and the estimator knows that.
 

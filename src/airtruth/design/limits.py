@@ -86,7 +86,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Extremes:
-    """What a flight reached.
+    """Extreme values of a flight.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Extremes:
         )
 
     def beside(self, limits: Limits) -> str:
-        """What is reached beside what is allowed, in words."""
+        """The extreme values and the limits, in words."""
         low, high = self.load_factor
         least, most = limits.load_factor
         limit = (

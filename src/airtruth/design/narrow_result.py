@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
-from airtruth.physics.short_period import UNITS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
@@ -259,7 +259,7 @@ class NarrowResult(PlannedCampaign):
         else:
             ax.set_xticks(range(len(kinds)), [label for label, *_ in kinds])
             ax.set_xlim(-0.5, len(kinds) - 0.5)
-            ax.set_ylabel(f"{target} [{UNITS.get(target, '-')}], 95 %")
+            ax.set_ylabel(f"{target} [{LONGITUDINAL.units.get(target, '-')}], 95 %")
 
     def __repr__(self) -> str:
         """Return the first lines of the summary."""

@@ -25,7 +25,7 @@ Step = Callable[[str], None]
 
 
 class Targets(Protocol):
-    """What a flight has to determine at a flight condition: merits of inputs are known over expected standard errors."""
+    """A question at a flight condition: it gives the merits of inputs from expected standard errors."""
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -47,15 +47,15 @@ class Targets(Protocol):
         """(targets,) known over expected standard error [-]; None if a motion is lost."""
 
     def quantities(self, flown: Flown, reference: Flown) -> tuple[Quantity, ...]:
-        """What is determined, by an input and by the reference."""
+        """The standard errors by an input and by the reference."""
 
 
 class Question(Protocol):
-    """What a flight has to determine: `airtruth.design.precision.DerivativeQuestion`, `airtruth.design.band.BandQuestion`."""
+    """A question to a flight: `airtruth.design.precision.DerivativeQuestion`, `airtruth.design.band.BandQuestion`."""
 
     @property
     def title(self) -> str:
-        """What the input does, in lower case."""
+        """The purpose of the input, in lower case."""
 
     def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> Targets:
         """The question at a flight condition."""

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedCampaign(ABC):
-    """What every result of `airtruth plan` that computes an input has.
+    """Common part of every result of `airtruth plan` that computes an input.
 
     Attributes
     ----------

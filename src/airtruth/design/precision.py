@@ -14,7 +14,6 @@ from airtruth.design.information import LinearExperiment, sensor_noise
 from airtruth.design.narrow_result import Quantity
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import Change, DerivativeTerm
 from airtruth.simulation.campaign.file import Campaign
 
@@ -35,7 +34,7 @@ class DerivativeQuestion:
 
     Attributes
     ----------
-    names : of `airtruth.physics.short_period.PARAMETERS`.
+    names : of ``LONGITUDINAL.parameters``.
     """
 
     names: tuple[str, ...]
@@ -54,11 +53,13 @@ class DerivativeQuestion:
             )
             if other is not None:
                 raise ConfigurationError(
-                    f"plan: derivative {name!r} belongs to the {other.heading.lower()}, for which no input is searched; "
-                    f"`airtruth plan CAMPAIGN.toml --motion {other.name}` predicts the accuracy of a campaign"
+                    f"plan: derivative {name!r} belongs to the {other.heading.lower()}, and an input determines those of one "
+                    "motion; plan the derivatives of each motion by a command of its own"
                 )
-            if name not in PARAMETERS:
-                raise ConfigurationError(f"plan: derivative {name!r}: {choices(name, PARAMETERS)}")
+            if name not in LONGITUDINAL.parameters:
+                raise ConfigurationError(
+                    f"plan: derivative {name!r}: {choices(name, LONGITUDINAL.parameters)}"
+                )
         if not self.names or len(set(self.names)) < len(self.names):
             raise ConfigurationError(
                 f"plan: derivatives {', '.join(self.names) or 'none'}: state each once, such as --derivative Cmq,Cmde"
@@ -66,7 +67,7 @@ class DerivativeQuestion:
 
     @property
     def title(self) -> str:
-        """What the input does."""
+        """The purpose of the input."""
         return f"the input that determines {', '.join(self.names)}"
 
     def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> Precision:
@@ -157,7 +158,7 @@ class Precision:
 
     @property
     def _index(self) -> list[int]:
-        return [PARAMETERS.index(name) for name in self.names]
+        return [LONGITUDINAL.parameters.index(name) for name in self.names]
 
     def rate(self, flown: Flown, *, final: bool = False) -> Array | None:
         """(targets,) declared over expected standard deviation [-]; None if a draw has no bound."""

@@ -48,7 +48,7 @@ _LOWEST_PERIODS: Final = 1.0
 
 
 class Merit(Protocol):
-    """What inputs are rated by."""
+    """A rule that rates inputs."""
 
     def rate(self, flown: Flown, *, final: bool = False) -> Array | None:
         """(parts,) merits of an input, all to be large; None if its motion is lost.

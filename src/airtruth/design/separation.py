@@ -72,7 +72,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Model:
-    """What the hypotheses have in common.
+    """Common part of the hypotheses.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the answer of a trace asks of the next flight: effects to separate, a derivative, or the band of an increment."""
+"""Question of the answer of a trace to the next flight: effects to separate, a derivative, or the band of an increment."""
 
 from __future__ import annotations
 

@@ -152,7 +152,7 @@ def factor(meaning: str, low: float, high: float, material: float) -> Parameter:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known before any record of an effect that explains changed derivatives, in the units of its size.
+    """Prior knowledge of an effect that explains changed derivatives, in the units of its size.
 
     Attributes
     ----------

@@ -149,14 +149,14 @@ def _scale(shape: Shape) -> float:
 
 
 def _words(acts_on: str) -> str:
-    """What an increment acts on, in words."""
+    """The coefficient on which an increment acts, in words."""
     if acts_on in _COEFFICIENTS:
         return _COEFFICIENTS[acts_on].description.partition(",")[0]
     return "axial force" if acts_on == AXIAL else f"reading of {acts_on}"
 
 
 def _of_memory(name: str, value: float, memory: Memory) -> Parameter:
-    """What a refit estimates of a memory: a time constant, a damping ratio or a half width."""
+    """Parameter of a memory that a refit estimates: a time constant, a damping ratio or a half width."""
     if name == "damping":
         return Parameter(name, "-", "damping ratio", 0.01, 0.7, 0.0, is_location=True, step=0.5)
     low, high = value / _REACH_OF_MEMORY, value * _REACH_OF_MEMORY

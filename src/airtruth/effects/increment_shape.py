@@ -76,7 +76,7 @@ class Memory:
 
     @property
     def values(self) -> dict[str, float]:
-        """What a refit estimates of it, by name."""
+        """Parameters of the memory that a refit estimates, by name."""
         if self.kind == "play":
             return {"half_width": self.half_width}
         return {"time_s": self.time_s} | ({"damping": self.damping} if self.kind == "mode" else {})

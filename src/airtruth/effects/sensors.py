@@ -60,7 +60,7 @@ _TURBULENCE: Final = (
     "Survey the position. Turbulence distinguishes it from a lag: a vane with a lag follows a gust late, an arm does not "
     "delay it."
 )
-"""What tells the arm of a vane apart."""
+"""Advice on telling the arm of a vane apart."""
 _ARMS: Final[Mapping[str, tuple[_Arm, ...]]] = {
     "alpha_rad": (
         _Arm("arm", "x_m", "alpha_vane = alpha - q x/V, first order in q x/V", 30.0, 0.05, _TURBULENCE),
@@ -147,11 +147,11 @@ _SCALED: Final[Mapping[str, str]] = {
 }
 """Channel -> what tells an error of its scale apart."""
 _KINEMATICS: Final = "Kinematics: alpha, theta, q and az must agree (`airtruth check`)."
-"""What tells a delay apart in the pitch plane."""
+"""Advice on telling a delay apart in the pitch plane."""
 _SIDE_KINEMATICS: Final = "Kinematics: beta, phi, p, r and ay must agree (`airtruth check`)."
-"""What tells a delay of a lateral channel apart."""
+"""Advice on telling a delay of a lateral channel apart."""
 _SECOND: Final = "A second sensor of the same quantity."
-"""What tells an error apart where no other channel does."""
+"""Advice on telling an error apart where no other channel does."""
 _MOST_SPANS: Final = 1.5
 """Largest distance of a sensor from the CG in wing spans [-] (judgement: the nose boom of a T-38 or an F-104 is 1.2 to 1.4
 spans ahead, that of a transport half a span)."""

@@ -180,7 +180,8 @@ def _of_mean(theta: Array, covariance: Array) -> Array:
 
 def _of_aircraft(aircraft: Aircraft, airspeed_m_s: float, altitude_m: float) -> LinearModel:
     from airtruth.tracing.model.declared import declared_covariance
-    from airtruth.tracing.model.plant import declared_derivatives, trim_of
+    from airtruth.tracing.model.plant import declared_derivatives
+    from airtruth.tracing.model.probed import trim_of
 
     density = float(density_kg_m3(altitude_m))
     at: Trim | None = None

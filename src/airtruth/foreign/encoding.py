@@ -87,7 +87,7 @@ def _no_text(content: bytes) -> bool:
 
 
 def _cure(content: bytes, at: int) -> str:
-    """What a file that is not UTF-8 seems to be, and what to do."""
+    """The likely encoding of a file that is not UTF-8, and what to do."""
     if content[:2] in _UTF16_MARKS or content.count(0) > len(content) / 4:
         return (
             "is not text in UTF-8 but probably in UTF-16; save it as UTF-8 (a spreadsheet: CSV UTF-8), or state "

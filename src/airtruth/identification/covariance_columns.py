@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def correlation_names(names: Sequence[str] = PARAMETERS) -> tuple[str, ...]:
+def correlation_names(names: Sequence[str] = LONGITUDINAL.parameters) -> tuple[str, ...]:
     """Columns of the correlations of derivatives, the upper triangle row by row.
 
     Examples
@@ -28,7 +28,9 @@ def correlation_names(names: Sequence[str] = PARAMETERS) -> tuple[str, ...]:
     return tuple(f"{one}_{other}_corr" for one, other in combinations(names, 2))
 
 
-def correlation_columns(covariance: Array, names: Sequence[str] = PARAMETERS) -> dict[str, Array]:
+def correlation_columns(
+    covariance: Array, names: Sequence[str] = LONGITUDINAL.parameters
+) -> dict[str, Array]:
     """Correlations [-] by the names of their columns; NaN where a variance is not positive.
 
     Parameters
@@ -45,7 +47,7 @@ def correlation_columns(covariance: Array, names: Sequence[str] = PARAMETERS) ->
     }
 
 
-def covariance_of(frame: pd.DataFrame, names: Sequence[str] = PARAMETERS) -> Array:
+def covariance_of(frame: pd.DataFrame, names: Sequence[str] = LONGITUDINAL.parameters) -> Array:
     """(rows, n, n) covariance of the derivatives of a table of estimates; NaN where the table does not hold it.
 
     Parameters

@@ -20,8 +20,8 @@ from airtruth.identification.estimates import (
     half_width,
     point_values,
 )
-from airtruth.identification.expected import EXPECTED
 from airtruth.numerics.order_statistics import Blocks, medians
+from airtruth.physics.expected import EXPECTED
 from airtruth.physics.motion import LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
@@ -168,7 +168,7 @@ def _some(count: int, runs: int) -> str:
 
 
 class _Method:
-    """What the runs of one method have in common: counts, sums, and the first run of each kind."""
+    """Common part of the runs of one method: counts, sums, and the first run of each kind."""
 
     def __init__(self, first: Estimates) -> None:
         self.name, self.covariance_name = first.method, first.covariance_name

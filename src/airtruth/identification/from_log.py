@@ -1,4 +1,4 @@
-"""What one log gives to an identification: the unit of work, in this process or on a cluster."""
+"""Identification of one log: the unit of work, in this process or on a cluster."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class LogTask:
 
 @dataclass
 class FromLog:
-    """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate.
+    """Result of one log: its runs and notes, the estimates of each method, or the parts of a joint estimate.
 
     ``dt_s`` is its longest sample period [s]; ``noisy`` are the runs whose airspeed is smoothed; ``changes`` are the runs whose
     `pressure_range` exceeds `CHANGES`, with it. ``curved`` counts the runs that show a nonlinear term of a coefficient;

@@ -181,7 +181,7 @@ def identified(
 
 @dataclass(frozen=True)
 class _Request:
-    """What to identify, and how."""
+    """A request for an identification: logs, aircraft and methods."""
 
     logs: Logs
     aircraft: str | Path | AircraftConstants

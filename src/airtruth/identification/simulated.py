@@ -24,7 +24,7 @@ from airtruth.logs.histories import Histories, History
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import PARAMETERS, Scale, normal_force_row, scale, system
+from airtruth.physics.short_period import Scale, normal_force_row, scale, system
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +46,7 @@ def simulate(theta: Array, s: Scale, dt_s: float, elevator_rad: Array, measured:
 
     Parameters
     ----------
-    theta : (6,) derivatives in the order of `PARAMETERS` [1/rad, rates as q c/(2V)].
+    theta : (6,) derivatives in the order of `LONGITUDINAL.parameters` [1/rad, rates as q c/(2V)].
     s : factors of the flight condition, scalars.
     dt_s : sample period [s].
     elevator_rad : (samples,) elevator, linear between samples [rad].
@@ -169,7 +169,7 @@ def _record(
     for method, row in rows.items():
         y = np.full_like(measured, np.nan)
         if row is not None:
-            theta = np.array([float(row[name]) for name in PARAMETERS])
+            theta = np.array([float(row[name]) for name in LONGITUDINAL.parameters])
             if (np.abs(theta) < _LARGEST).all():
                 y = simulate(theta, s, dt, channels["elevator_rad"], measured)
         models[method] = {c: y[:, i] for i, c in enumerate(OUTPUTS)}

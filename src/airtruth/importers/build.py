@@ -91,7 +91,7 @@ _HELD: Final = (
     "each sample is repeated until the next one, {:g} Hz of its own; only these samples are used, and values between are "
     "interpolated"
 )
-"""What is stated of a channel of a slower instrument."""
+"""Note on a channel of a slower instrument."""
 
 
 def _resampled(
@@ -115,7 +115,7 @@ _METHODS: Final = {
 
 
 def sentences(log: FlightLog) -> list[str]:
-    """What was assumed, left out and resampled, and what records have lost at their ends, in words."""
+    """Assumed, left-out and resampled channels, and time that records have lost at their ends, in words."""
     stated = [log.metadata.get(key, ()) for key in (_READ, _SHORTENED)]
     listed = [str(text) for one in stated if isinstance(one, Sequence) for text in one]
     how = log.metadata.get(RESAMPLED)

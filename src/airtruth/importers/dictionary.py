@@ -164,7 +164,7 @@ class Lexicon:
         return next(((e, p) for p in self.parts for e in p.columns if e.matches(name)), None)
 
     def meanings(self, plain: str) -> tuple[str, ...]:
-        """What a compact name may be; only the user's meaning where there is one."""
+        """Possible meanings of a compact name; only the user's meaning where there is one."""
         for part in self.parts:
             if part.title == Words.title and plain in part.names:
                 return part.names[plain]

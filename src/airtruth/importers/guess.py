@@ -159,7 +159,7 @@ def _source_table(section: SourceSection) -> Iterator[str]:
 
 
 def _judgement(source: Source, body: str, proposal: Proposal) -> list[str]:
-    """What is missing or in doubt, or what physics says of the guess."""
+    """The missing or doubtful channels, or the verdict of physics on the guess."""
     if proposal.doubts:
         return [f"Not mapped: {text}." for text in proposal.doubts]
     try:

@@ -88,7 +88,7 @@ def uniform(
 
 
 def shortened(series: Mapping[str, Series]) -> list[str]:
-    """What a record loses at its ends because one channel has no value there while others have, in words.
+    """Time that a record loses at its ends because one channel has no value there while others have, in words.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def shortened(series: Mapping[str, Series]) -> list[str]:
 
 
 def beyond(series: Mapping[str, Series], start_s: float, end_s: float) -> list[str]:
-    """What a run lacks of the times that the mapping states for it, in words.
+    """Time that a run lacks of the times that the mapping states for it, in words.
 
     Parameters
     ----------

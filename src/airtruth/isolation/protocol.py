@@ -1,4 +1,4 @@
-"""What passes between the caller and the disposable process: a task as JSON, a reply as JSON with arrays behind it."""
+"""Messages between the caller and the disposable process: a task as JSON, a reply as JSON with arrays behind it."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ def _ended(facts: dict[str, object]) -> bool:
 
 @lru_cache(maxsize=1)
 def _machine() -> dict[str, str]:
-    """What distinguishes this start of this machine, and the process numbers of this container, from others."""
+    """Identity of this start of this machine, and of the process numbers of this container."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
         return {"boot": boot, "processes": os.readlink("/proc/self/ns/pid")}

@@ -22,7 +22,7 @@ from airtruth.logs.temporary import clear
 
 
 class Outputs:
-    """What one command may write.
+    """Outputs that one command may write.
 
     Parameters
     ----------

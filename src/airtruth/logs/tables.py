@@ -268,7 +268,7 @@ def opened(path: Path) -> Iterator[pq.ParquetFile]:
 
 @contextmanager
 def source_of(path: Path) -> Iterator[Path | BinaryIO]:
-    """What pyarrow opens: the path, or the opened file of a store or where the path's name is not UTF-8."""
+    """Argument for pyarrow: the path, or the opened file of a store or where the path's name is not UTF-8."""
     if isinstance(path, RemotePath):
         with path.opened() as file:
             yield file

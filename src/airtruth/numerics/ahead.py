@@ -33,7 +33,7 @@ PATIENCE_S: Final = 120
 
 
 class Ahead(NamedTuple):
-    """What a child compiles.
+    """Work of a child that compiles.
 
     Attributes
     ----------

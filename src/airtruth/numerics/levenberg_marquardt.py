@@ -55,7 +55,7 @@ class Status(IntEnum):
 
 
 class Evaluation(Protocol):
-    """What a caller returns for a point: the cost, and whatever its own ``step`` needs."""
+    """Value of a caller at a point: the cost, and whatever its own ``step`` needs."""
 
     @property
     def cost(self) -> float:

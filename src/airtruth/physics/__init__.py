@@ -1,1 +1,1 @@
-"""What both sides of a flight log share: atmosphere, gusts, sensors, actuators, the short period."""
+"""Physics that both sides of a flight log share: atmosphere, gusts, sensors, actuators, the short period."""

@@ -42,7 +42,7 @@ ICED: Final = (-0.100, -0.0135, -0.095, -0.099, -0.035, -0.100)
 
 @dataclass(frozen=True)
 class TailGeometry:
-    """What is declared of wing, tail and fin; None where it has to be inferred.
+    """Declared wing, tail and fin; None where a value has to be inferred.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ _REFERENCE_LOSS: Final = 0.2
 
 @dataclass(frozen=True)
 class SideGeometry:
-    """What is declared of fin and wing; None where it has to be inferred. The other defaults are judgement.
+    """Declared fin and wing; None where a value has to be inferred. The other defaults are judgement.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ def tip_part(derivatives: Array, geometry: SideGeometry) -> Array:
 
 
 def tip_at_rest(geometry: SideGeometry) -> Mapping[str, float]:
-    """What a lost right wing tip adds at rest, per semispan lost.
+    """Increments of a lost right wing tip at rest, per semispan lost.
 
     Returns
     -------

@@ -123,7 +123,7 @@ def flap_effectiveness(share: float) -> float:
 
 
 def derivatives(planform: Planform) -> dict[str, float]:
-    """The six derivatives by eqs. (1) to (8), by the names of `airtruth.physics.short_period.PARAMETERS` [1/rad].
+    """The six derivatives by eqs. (1) to (8), by the names of ``LONGITUDINAL.parameters`` [1/rad].
 
     Examples
     --------

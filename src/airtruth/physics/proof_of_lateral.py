@@ -45,7 +45,7 @@ TOLERANCES: Final[Mapping[str, Tolerance]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class LateralProof:
-    """What the tests of the lateral modes compare; NaN where the motion has no such root or state.
+    """Values that the tests of the lateral modes compare; NaN where the motion has no such root or state.
 
     Attributes
     ----------

@@ -62,7 +62,7 @@ _OF_RATE: Final = Tolerance(2.0 * DEG, 0.10)
 
 @dataclass(frozen=True)
 class Proof:
-    """What a simulation of a motion has to match.
+    """Tolerances that a simulation of a motion has to keep.
 
     Attributes
     ----------

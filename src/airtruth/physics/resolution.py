@@ -126,7 +126,7 @@ def _resolved(causes: tuple[DerivativeTerm, ...], at: LinearPoint) -> Change:
 
 
 def _at_rest(causes: Iterable[DerivativeTerm], at: LinearPoint) -> Iterator[AeroTerm | DeclaredTerm]:
-    """What parts add beside the derivatives."""
+    """Increments of parts beside the derivatives."""
     for term in causes:
         part = PARTS.get(term.cause)
         if part is not None and part.at_rest is not None:

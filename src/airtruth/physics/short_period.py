@@ -7,7 +7,6 @@ Deviations from trim; derivatives per radian, rate derivatives per q c/(2V).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +15,8 @@ from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
 
-PARAMETERS: Final = LONGITUDINAL.parameters
-"""Names of the six derivatives [-], in the order of every array of derivatives."""
-CL_ALPHA, CL_Q, CL_DE, CM_ALPHA, CM_Q, CM_DE = range(len(PARAMETERS))
-"""Indices in `PARAMETERS`."""
-MODAL: Final = LONGITUDINAL.modal
-"""Names of the modal parameters: natural frequency [rad/s] and damping ratio [-]."""
-UNITS: Final = LONGITUDINAL.units
-"""Derivative or modal parameter -> its unit; rate derivatives are those to q c/(2V), which has none."""
+CL_ALPHA, CL_Q, CL_DE, CM_ALPHA, CM_Q, CM_DE = range(len(LONGITUDINAL.parameters))
+"""Positions in ``LONGITUDINAL.parameters``."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +71,7 @@ def system(theta: Array, s: Scale) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    theta : (..., 6) derivatives in the order of `PARAMETERS` [-].
+    theta : (..., 6) derivatives in the order of ``LONGITUDINAL.parameters`` [-].
     s : factors, scalars or arrays of shape (...).
 
     Returns
@@ -144,8 +137,6 @@ __all__ = [
     "CM_ALPHA",
     "CM_DE",
     "CM_Q",
-    "MODAL",
-    "PARAMETERS",
     "Scale",
     "derivatives",
     "modal",

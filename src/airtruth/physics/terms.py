@@ -160,7 +160,7 @@ class AeroTerm:
 
     @property
     def curve(self) -> tuple[str, str, str, float] | None:
-        """What the bends of one table share: coefficient, signal, factor and its origin; None for a term that is no bend."""
+        """Key that the bends of one table share: coefficient, signal, factor and its origin; None for a term that is no bend."""
         is_bend = self.shape in ("above", "below")
         return (self.coefficient, self.signal, self.factor, self.factor_at) if is_bend else None
 

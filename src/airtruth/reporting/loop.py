@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import LogError, counted
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting.campaign import Campaign
 from airtruth.reporting.paper.layout import STANDARD_ERROR
 from airtruth.reporting.paper.published import DECIMALS, SYMBOLS
@@ -118,7 +118,7 @@ def evaluate(campaign: Campaign, name: str, title: str, notes: Sequence[str] = (
         name=name,
         title=title,
         campaign=campaign,
-        truth=campaign.truth[campaign.flown][:, : len(PARAMETERS)].mean(axis=0),
+        truth=campaign.truth[campaign.flown][:, : len(LONGITUDINAL.parameters)].mean(axis=0),
         statistics={m: (statistics[m], statistics[m + WITH_EFFECTS]) for m in methods},
         notes=tuple(notes),
     )
@@ -127,7 +127,7 @@ def evaluate(campaign: Campaign, name: str, title: str, notes: Sequence[str] = (
 def bias_pct(s: MethodStatistics, truth: Array) -> tuple[Array, Array]:
     """Return the bias of the six derivatives and its standard error [% of the truth]; positive: too large in magnitude."""
     size = np.abs(truth) / 100.0
-    six = slice(len(PARAMETERS))
+    six = slice(len(LONGITUDINAL.parameters))
     sign = np.sign(truth)
     return sign * (s.mean.value[six] - truth) / size, s.mean.se[six] / size
 
@@ -139,7 +139,7 @@ def bars(table: LoopTable) -> dict[str, dict[str, Bar]]:
         own = result.setdefault(method, {})
         (before, before_se), (after, after_se) = (bias_pct(s, table.truth) for s in pair)
         for name, limit in BARS.items():
-            j = PARAMETERS.index(name)
+            j = LONGITUDINAL.parameters.index(name)
             most = abs(before[j]) + 2.0 * math.hypot(before_se[j], after_se[j]) if limit is None else limit
             own[name] = Bar(float(before[j]), float(after[j]), bool(abs(after[j]) <= most))
     return result
@@ -180,7 +180,7 @@ def _stages(table: LoopTable, label: str, cell: Callable[[MethodStatistics], Cel
 
 
 def _means(table: LoopTable) -> Iterator[Row]:
-    for j, name in enumerate(PARAMETERS):
+    for j, name in enumerate(LONGITUDINAL.parameters):
         d = DECIMALS[name]
         for stage, label in enumerate(STAGES):
             own = [pair[stage] for pair in table.statistics.values()]
@@ -197,7 +197,7 @@ def _biases(table: LoopTable) -> Iterator[Row]:
         value, se = bias_pct(s, table.truth)
         return _pair(value[j], se[j], 1)
 
-    for j, name in enumerate(PARAMETERS):
+    for j, name in enumerate(LONGITUDINAL.parameters):
         yield from _stages(table, name, partial(cell, j))
 
 
@@ -207,9 +207,9 @@ def _relerr(table: LoopTable) -> Iterator[Row]:
 
 def _rmse(table: LoopTable) -> Iterator[Row]:
     def cell(j: int, s: MethodStatistics) -> Cell:
-        return _pair(s.rmse.value[j], s.rmse.se[j], DECIMALS[PARAMETERS[j]])
+        return _pair(s.rmse.value[j], s.rmse.se[j], DECIMALS[LONGITUDINAL.parameters[j]])
 
-    for j, name in enumerate(PARAMETERS):
+    for j, name in enumerate(LONGITUDINAL.parameters):
         yield from _stages(table, name, partial(cell, j))
 
 
@@ -243,7 +243,7 @@ def long_form(table: LoopTable) -> Table:
 def _numbers(s: MethodStatistics, truth: Array) -> Iterator[tuple[str, str, float, float]]:
     """Parameter, statistic, value and standard error."""
     bias = bias_pct(s, truth)
-    for j, name in enumerate(PARAMETERS):
+    for j, name in enumerate(LONGITUDINAL.parameters):
         for statistic, values, errors in (
             ("mean", s.mean.value, s.mean.se),
             ("std", s.std.value, s.std.se),

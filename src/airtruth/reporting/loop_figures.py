@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth import style
 from airtruth.channels import shown
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting.loop import BARS, LoopTable, bias_pct
 from airtruth.reporting.paper.published import SYMBOLS
 from airtruth.tracing import TraceResult
@@ -49,7 +49,7 @@ def bias_figure(table: LoopTable) -> Figure:
 
 
 def _bias_panel(ax: Axes, table: LoopTable, methods: list[str], name: str) -> None:
-    j = PARAMETERS.index(name)
+    j = LONGITUDINAL.parameters.index(name)
     limit = BARS.get(name)
     if limit is not None:
         ax.axvspan(-limit, limit, color=style.SKY, alpha=0.25, lw=0.0, label=f"bias of at most {limit:g} %")

@@ -41,7 +41,7 @@ def logged(lateral: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Readings:
-    """What the sensors read beyond their errors.
+    """Readings of the sensors beyond their errors.
 
     Attributes
     ----------

@@ -1,8 +1,10 @@
-"""The derivatives of an aircraft at a trim, by differences in JSBSim."""
+"""The derivatives of a motion of an aircraft at a trim, by differences in JSBSim."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -11,98 +13,185 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
 from airtruth.physics import short_period
+from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_scale
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.simulation.attitude import straight_attitude
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
-from airtruth.units import DEG
+from airtruth.units import DEG, FT, PSF
 
 Array = NDArray[np.float64]
 
-STEPS: Final = (0.01 * DEG, 0.01 * DEG, 0.05 * DEG)
-"""Default steps in alpha [rad], elevator command [rad] and q [rad/s] (judgement: inside a cell of
-tables stated in degrees, and far above rounding)."""
+STEPS: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
+    {
+        LONGITUDINAL.name: {"alpha": 0.01 * DEG, "elevator": 0.01 * DEG, "qhat": 0.05 * DEG},
+        LATERAL.name: dict(
+            zip((s.name for s in LATERAL.signals), (0.5 * DEG, DEG, DEG, 0.5 * DEG, 0.5 * DEG), strict=True)
+        ),
+    }
+)
+"""Motion -> steps in the flow angle [rad], rates [rad/s] and commands [rad] of its signals (judgement). In the
+pitch plane inside a cell of tables stated in degrees, and far above rounding; tables of a symmetric
+aircraft break at zero, a tenth of a degree beside its trim, and central differences over the break are the mean of its sides,
+which a flight sees."""
+_LEAST_MOTION: Final = 1e-6
+"""Least determinant of the motion of the surfaces with their commands [-]: a surface that stands still is refused."""
+_FORCES: Final = ("forces/fby-total-lbs", "moments/l-total-lbsft", "moments/n-total-lbsft")
+"""Side force [lbf], rolling and yawing moment about the CG [lbf ft], without gravity."""
 
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Declared derivatives about the CG, in the order of `short_period.PARAMETERS`.
+    """Declared derivatives about the CG, in the order of the parameters of a motion.
 
     Attributes
     ----------
-    plus, minus, central : (6,) one-sided (upward, downward) and central differences [-].
-        Tables are piecewise linear: at a break the sides differ. ``plus`` is the paper's truth.
+    plus, minus, central : (derivatives,) one-sided (upward, downward) and central differences [-].
+        Tables are piecewise linear: at a break the sides differ. ``plus`` of the pitch plane is the paper's truth.
     scale : factors at this trim.
-    wn_rad_s, zeta : modal parameters of ``plus``.
+    modes : modal parameters by name, of ``plus`` in the pitch plane and of ``central`` in six axes.
     """
 
     plus: Array
     minus: Array
     central: Array
-    scale: short_period.Scale
-    wn_rad_s: float
-    zeta: float
+    scale: short_period.Scale | LateralScale
+    modes: Mapping[str, float]
 
 
 def linearise(
-    aircraft: Aircraft, trim: Trim, dt_s: float = 1.0 / 200.0, steps: tuple[float, float, float] = STEPS
+    aircraft: Aircraft, trim: Trim, dt_s: float = 1.0 / 200.0, motion: Motion = LONGITUDINAL
 ) -> Linearisation:
-    """Differences of alpha_dot and q_dot in alpha, q and elevator surface, at constant airspeed and flight path.
+    """Differences in the signals of a motion, at constant airspeed and constant surfaces.
 
-    The derivatives are those that make eq. (2) of the paper equal to the differences: CLalpha is
-    -(m V/(q_bar S)) d(alpha_dot)/d(alpha), thrust and drag terms included. Where feedback moves
-    the elevator with alpha or q, its contribution is subtracted: the derivatives are at a constant surface.
+    In the pitch plane they are those of alpha_dot and q_dot at a constant flight path, and the derivatives make eq. (2) of the
+    paper equal to them: CLalpha is -(m V/(q_bar S)) d(alpha_dot)/d(alpha), thrust and drag terms included. In six axes they are
+    those of CY, Cl and Cn of all forces but weight, about the CG, in body axes, at constant alpha. Where feedback moves a surface
+    with the motion, its contribution is subtracted.
 
     Parameters
     ----------
-    aircraft, trim : the aircraft and its equilibrium.
+    aircraft, trim : the aircraft and its equilibrium, in six axes for the lateral-directional motion.
     dt_s : simulation step of the executive [s].
-    steps : steps in alpha [rad], elevator command [rad] and q [rad/s].
+    motion : whose derivatives.
 
     Raises
     ------
     TrimError
-        If the elevator surface does not follow its command at the trim.
+        If the surfaces do not follow their commands at the trim, or the trim is one of the pitch plane for a lateral motion.
     """
+    if motion is LATERAL and not trim.condition.six_axes:
+        raise TrimError(
+            f"{aircraft.name}: lateral derivatives need a trim in six axes; state wings-level or no-sideslip in the condition"
+        )
     executive = Executive(aircraft, dt_s)
+    origin = _answer(executive, trim, motion, {})
+    sides = [_one_sided(executive, trim, motion, origin, side) for side in (1.0, -1.0)]
+    return (_in_six_axes if motion is LATERAL else _in_pitch)(aircraft, trim, sides)
+
+
+def _answer(executive: Executive, trim: Trim, motion: Motion, change: Mapping[str, float]) -> Array:
+    """Answers of a motion in a state off the trim, and its surfaces [rad]: see `_accelerations` and `_coefficients`."""
+    executive = executive.again()
+    off = {signal.channel: change.get(signal.name, 0.0) for signal in motion.signals}
+    at = trim.controls
+    commands = {c.command: getattr(at, c.command) + off.pop(c.channel) for c in motion.controls}
+    alpha = trim.alpha_rad + off.pop("alpha_rad", 0.0)
+    sideslip = at.sideslip_rad + off.pop("beta_rad", 0.0)
+    executive.initialise(trim.condition, alpha, replace(at, sideslip_rad=sideslip, **commands), **off)
+    answered = _coefficients(executive, trim) if motion is LATERAL else _accelerations(executive, trim, alpha)
+    response = executive.respond()
+    return np.array([*answered, *(getattr(response, c.channel) for c in motion.controls)])
+
+
+def _accelerations(executive: Executive, trim: Trim, alpha: float) -> tuple[float, ...]:
+    """alpha_dot [rad/s] and q_dot [rad/s2] in the present state."""
+    r = executive.respond()
+    return (r.w_dot_m_s2 * np.cos(alpha) - r.u_dot_m_s2 * np.sin(alpha)) / trim.airspeed_m_s, r.q_dot_rad_s2
+
+
+def _coefficients(executive: Executive, trim: Trim) -> tuple[float, ...]:
+    """CY, Cl and Cn in the present state [-]."""
+    c = executive.aircraft.constants
+    force, roll, yaw = (executive.fdm[name] for name in _FORCES)
+    area = 0.5 * trim.density_kg_m3 * trim.airspeed_m_s**2 / PSF * c.wing_area_m2 / FT**2  # q_bar S [lbf]
+    span = c.span_m / FT
+    return force / area, roll / (area * span), yaw / (area * span)
+
+
+def _one_sided(
+    executive: Executive, trim: Trim, motion: Motion, origin: Array, side: float
+) -> tuple[Array, Array]:
+    """Slopes of the answers over the states at constant surfaces, and over the surfaces."""
+    columns = {
+        name: (_answer(executive, trim, motion, {name: side * step}) - origin) / (side * step)
+        for name, step in STEPS[motion.name].items()
+    }
+    slopes = np.column_stack([columns[signal.name] for signal in motion.signals])
+    surfaces = len(motion.controls)
+    of_surfaces, by_command = slopes[-surfaces:], slopes[:-surfaces, -surfaces:]
+    if abs(np.linalg.det(of_surfaces[:, -surfaces:])) < _LEAST_MOTION:
+        names = [control.name for control in motion.controls]
+        raise TrimError(
+            f"{' and '.join(names)} do not follow their commands at the trim; check command, surface and command_per_rad of "
+            f"{' and '.join(f'jsbsim.{name}' for name in names)} in aircraft.toml"
+        )
+    by_surface: Array = np.asarray(
+        np.linalg.solve(of_surfaces[:, -surfaces:].T, by_command.T).T, dtype=np.float64
+    )
+    return slopes[:-surfaces, :-surfaces] - by_surface @ of_surfaces[:, :-surfaces], by_surface
+
+
+def _in_pitch(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) -> Linearisation:
     c = aircraft.constants
     s = short_period.scale(
         c.wing_area_m2, c.chord_m, trim.mass_kg, c.inertia_yy_kg_m2, trim.airspeed_m_s, trim.density_kg_m3
     )
-    origin = _probe(executive, trim, 0.0, 0.0, 0.0)
-    plus = _one_sided(executive, trim, origin, s, steps, 1.0)
-    minus = _one_sided(executive, trim, origin, s, steps, -1.0)
-    wn, zeta = short_period.modal(plus, s)
-    return Linearisation(plus, minus, 0.5 * (plus + minus), s, float(wn), float(zeta))
+    plus, minus = (short_period.derivatives(a, b[:, 0], s) for a, b in sides)
+    modes = map(float, short_period.modal(plus, s))
+    named = dict(zip(LONGITUDINAL.modal, modes, strict=True))
+    return Linearisation(plus, minus, 0.5 * (plus + minus), s, named)
 
 
-def _probe(executive: Executive, trim: Trim, d_alpha: float, d_elevator: float, d_q: float) -> Array:
-    """[alpha_dot, q_dot, elevator] in a state off the trim."""
-    executive = executive.again()
-    alpha = trim.alpha_rad + d_alpha
-    command = trim.controls.elevator_command_rad + d_elevator
-    controls = replace(trim.controls, elevator_command_rad=command)
-    executive.initialise(trim.condition, alpha, controls, d_q)
-    r = executive.respond()
-    alpha_dot = (r.w_dot_m_s2 * np.cos(alpha) - r.u_dot_m_s2 * np.sin(alpha)) / trim.airspeed_m_s
-    return np.array([alpha_dot, r.q_dot_rad_s2, r.elevator_rad])
+def _in_six_axes(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) -> Linearisation:
+    c, at = aircraft.constants, trim.controls
+    attitude = straight_attitude(trim.alpha_rad, at.sideslip_rad, at.bank_rad, trim.condition.gamma_rad)
+    s = lateral_scale(
+        c.model_copy(update={"mass_kg": trim.mass_kg}),
+        trim.airspeed_m_s,
+        trim.density_kg_m3,
+        trim.alpha_rad,
+        attitude.theta_rad,
+    )
+    rates = np.array([1.0, *2 * [2.0 * trim.airspeed_m_s / c.span_m]])
+    plus, minus = (np.hstack([a * rates, b]).ravel() for a, b in sides)
+    central = 0.5 * (plus + minus)
+    modes = dict(zip(LATERAL.modal, lateral_modal(central, s).tolist(), strict=True))
+    return Linearisation(plus, minus, central, s, modes)
 
 
-def _one_sided(
-    executive: Executive,
-    trim: Trim,
-    origin: Array,
-    s: short_period.Scale,
-    steps: tuple[float, float, float],
-    side: float,
-) -> Array:
-    d_alpha, d_elevator, d_q = (side * h for h in steps)
-    by_alpha = (_probe(executive, trim, d_alpha, 0.0, 0.0) - origin) / d_alpha
-    by_elevator = (_probe(executive, trim, 0.0, d_elevator, 0.0) - origin) / d_elevator
-    by_q = (_probe(executive, trim, 0.0, 0.0, d_q) - origin) / d_q
-    if abs(by_elevator[2]) < 1e-6:
-        raise TrimError(
-            "the elevator surface does not follow its command at the trim; "
-            "check jsbsim.elevator.command, surface and command_per_rad in aircraft.toml"
-        )
-    b = by_elevator[:2] / by_elevator[2]
-    a = np.column_stack([by_alpha[:2] - b * by_alpha[2], by_q[:2] - b * by_q[2]])
-    return short_period.derivatives(a, b, s)
+def lateral_truth(linear: Linearisation | None, trim: Trim | None) -> dict[str, float]:
+    """Columns of truth.parquet of a run in six axes.
+
+    The derivatives are central differences, with those of each side beside them; then modes and the lateral trim.
+
+    Parameters
+    ----------
+    linear, trim : of the run's condition; None for a run that failed, whose columns are NaN.
+    """
+    names = LATERAL.parameters
+    missing = np.full(len(names), np.nan)
+    result: dict[str, float] = {}
+    for suffix, side in (("", "central"), ("_plus", "plus"), ("_minus", "minus")):
+        values = missing if linear is None else getattr(linear, side)
+        result |= {name + suffix: float(v) for name, v in zip(names, values, strict=True)}
+    result |= {name: np.nan if linear is None else linear.modes[name] for name in LATERAL.modal}
+    at = None if trim is None else trim.controls
+    return result | {
+        **{f"trim_{c.channel}": getattr(trim, c.channel) if trim else np.nan for c in LATERAL.controls},
+        "trim_phi_rad": at.bank_rad if at else np.nan,
+        "trim_beta_rad": at.sideslip_rad if at else np.nan,
+    }
+
+
+__all__ = ["STEPS", "Linearisation", "lateral_truth", "linearise"]

@@ -18,7 +18,8 @@ from airtruth.logs.tables import Kind, require_kinds
 from airtruth.logs.validate import validate
 from airtruth.physics import atmosphere
 from airtruth.physics.late_surface import shift_of_a_delay
-from airtruth.physics.short_period import PARAMETERS, scale
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import scale
 from airtruth.quantity import Quantity
 from airtruth.simulation.linearise import Linearisation
 from airtruth.simulation.resolution import trimmed_and_linear
@@ -34,7 +35,7 @@ class NewAircraft:
     Attributes
     ----------
     aircraft : as written and read back.
-    derivatives : as written, by the names of `airtruth.physics.short_period.PARAMETERS` [1/rad].
+    derivatives : as written, by the names of ``LONGITUDINAL.parameters`` [1/rad].
     trim : its trim in JSBSim.
     linear : derivatives and modes of the written model at that trim.
     """
@@ -51,10 +52,10 @@ class NewAircraft:
             f"{self.aircraft.folder}: {self.aircraft.name}, trimmed at {at.airspeed_m_s:.4g} m/s, "
             f"{at.condition.altitude_m:.0f} m, "
             f"alpha {at.alpha_rad / DEG:.3f} deg, elevator {at.elevator_rad / DEG:.3f} deg",
-            f"short period {linear.wn_rad_s:.4g} rad/s, damping {linear.zeta:.3f}",
+            "short period {:.4g} rad/s, damping {:.3f}".format(*linear.modes.values()),
             "          written       flown",
         ]
-        for name, value in zip(PARAMETERS, linear.central, strict=True):
+        for name, value in zip(LONGITUDINAL.parameters, linear.central, strict=True):
             lines.append(f"{name:8s} {self.derivatives[name].value:10.5g}  {value:10.5g}")
         return "\n".join(lines)
 
@@ -107,7 +108,7 @@ def estimated_derivatives(table: Path, method: str | None = None) -> dict[str, Q
         If the table cannot be read.
     """
     frame = read_table(table)
-    names = [name + end for name in PARAMETERS for end in ("", "_std")]
+    names = [name + end for name in LONGITUDINAL.parameters for end in ("", "_std")]
     kinds: dict[str, Kind] = {"method": "text", "converged": "flag", **dict.fromkeys(names, "number")}
     require_kinds(table, frame, kinds, "give a file that `airtruth identify` wrote")
     return from_estimates(frame, method)
@@ -153,8 +154,10 @@ def allowing_for_delay(
     factors = scale(
         c.wing_area_m2, c.chord_m, c.mass_kg, c.inertia_yy_kg_m2, at.airspeed_m_s, at.density_kg_m3
     )
-    theta = np.array([estimates[name].value for name in PARAMETERS])
-    shifts = dict(zip(PARAMETERS, shift_of_a_delay(theta, factors, delay_s).tolist(), strict=True))
+    theta = np.array([estimates[name].value for name in LONGITUDINAL.parameters])
+    shifts = dict(
+        zip(LONGITUDINAL.parameters, shift_of_a_delay(theta, factors, delay_s).tolist(), strict=True)
+    )
     widened = {
         name: q.model_copy(update={"std": math.hypot(q.std, shifts[name])}) for name, q in estimates.items()
     }
@@ -181,8 +184,8 @@ def stated_derivative(text: str) -> tuple[str, Quantity]:
     ('Cmalpha', -1.2)
     """
     name, _, value = text.partition("=")
-    if name not in PARAMETERS:
-        raise ConfigurationError(f"--derivative {text!r}: {choices(name, PARAMETERS)}")
+    if name not in LONGITUDINAL.parameters:
+        raise ConfigurationError(f"--derivative {text!r}: {choices(name, LONGITUDINAL.parameters)}")
     try:
         number = float(value)
     except ValueError:

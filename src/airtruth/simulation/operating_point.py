@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.physics.longitudinal import ForceTables
+from airtruth.physics.motion import LATERAL
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.linearise_lateral import LateralLinearisation, linearise_lateral
 from airtruth.simulation.probe import Grid, forces_at_speeds, forces_over_alpha, probe, with_breaks
 from airtruth.simulation.probe_lateral import LateralGrid, LateralTables, probe_lateral
 from airtruth.simulation.trim import Trim
@@ -67,7 +67,7 @@ class LateralOperatingPoint:
     """An aircraft about a trim in six axes: its tables and its derivatives."""
 
     tables: LateralTables
-    derivatives: LateralLinearisation
+    derivatives: Linearisation
 
 
 def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -> LateralOperatingPoint:
@@ -83,7 +83,9 @@ def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -
     TrimError
         If aileron and rudder do not follow their commands at the trim.
     """
-    return LateralOperatingPoint(probe_lateral(aircraft, trim, grid), linearise_lateral(aircraft, trim))
+    return LateralOperatingPoint(
+        probe_lateral(aircraft, trim, grid), linearise(aircraft, trim, motion=LATERAL)
+    )
 
 
 __all__ = ["LateralOperatingPoint", "OperatingPoint", "lateral_operating_point", "operating_point"]

@@ -12,20 +12,19 @@ from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.physics.terms import Change
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.linearise_lateral import LateralLinearisation, linearise_lateral
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import G0
 
 
 def trimmed_and_linear(
-    aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0
+    aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0, motion: Motion = LONGITUDINAL
 ) -> tuple[Trim, Linearisation]:
     """Trim an aircraft and return its derivatives there, in a disposable process.
 
     Parameters
     ----------
-    aircraft, condition, dt_s : as in `airtruth.simulation.trim.trim`.
+    aircraft, condition, dt_s : as in `airtruth.simulation.trim.trim`; motion : whose derivatives.
 
     Raises
     ------
@@ -34,12 +33,14 @@ def trimmed_and_linear(
     AircraftError
         If the model ends or blocks its process.
     """
-    return isolated(f"the trim of {aircraft.name}", _trimmed_and_linear, aircraft, condition, dt_s)
+    return isolated(f"the trim of {aircraft.name}", _trimmed_and_linear, aircraft, condition, dt_s, motion)
 
 
-def _trimmed_and_linear(aircraft: Aircraft, condition: Condition, dt_s: float) -> tuple[Trim, Linearisation]:
+def _trimmed_and_linear(
+    aircraft: Aircraft, condition: Condition, dt_s: float, motion: Motion
+) -> tuple[Trim, Linearisation]:
     at = trim(aircraft, condition, dt_s)
-    return at, linearise(aircraft, at, dt_s)
+    return at, linearise(aircraft, at, dt_s, motion)
 
 
 def linear_point(
@@ -63,7 +64,7 @@ def linear_point(
     if motion is LONGITUDINAL:
         return point_of(aircraft, *trimmed_and_linear(aircraft, condition, dt_s))
     straight = condition if condition.six_axes else replace(condition, straight="wings-level")
-    at, linear = isolated(f"the trim of {aircraft.name}", _trimmed_and_lateral, aircraft, straight, dt_s)
+    at, linear = trimmed_and_linear(aircraft, straight, dt_s, LATERAL)
     trimmed = {
         LATERAL.flow: at.controls.sideslip_rad,
         **{c.name: getattr(at, c.channel) for c in LATERAL.controls},
@@ -73,13 +74,6 @@ def linear_point(
     return LinearPoint(
         linear.central, trimmed, tail_geometry(aircraft), LATERAL, weight=at.mass_kg * G0 / force
     )
-
-
-def _trimmed_and_lateral(
-    aircraft: Aircraft, condition: Condition, dt_s: float
-) -> tuple[Trim, LateralLinearisation]:
-    at = trim(aircraft, condition, dt_s)
-    return at, linearise_lateral(aircraft, at, dt_s)
 
 
 def point_of(aircraft: Aircraft, at: Trim, linear: Linearisation) -> LinearPoint:

@@ -24,7 +24,7 @@ _WEIGHED_STD: Final = 0.01
 
 @dataclass(frozen=True)
 class Measured:
-    """What a user measures with a tape and scales; None where it is not known.
+    """Dimensions and mass that a user measures with a tape and scales; None where they are not known.
 
     Attributes
     ----------

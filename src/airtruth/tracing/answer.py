@@ -195,7 +195,7 @@ class RecordNames:
 
 @dataclass(frozen=True)
 class TraceAnswer:
-    """What trace.json states (docs/trace.md).
+    """The content of trace.json (docs/trace.md).
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ class TraceAnswer:
         return f"TraceAnswer({self.verdict}{doubt}: {named or 'no effect'}; model {self.model})"
 
     def to_dict(self) -> dict[str, Any]:
-        """What trace.json holds."""
+        """The content of trace.json."""
         found = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
         found["shown_by"] = {"anomaly": self.anomaly.where, "remaining": self.remaining.where}
         optional = {name for name in ("tolerances", "replay", "axial_force") if getattr(self, name) is None}

@@ -35,6 +35,7 @@ from airtruth.tracing.increment_table import table_of
 from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
+from airtruth.tracing.model.plant import FLOW
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.increment_fit import LEAST_ODDS, effective_bends, is_apart_from_zero
 from airtruth.tracing.selection.increments import CELLS, best_prior, covered
@@ -66,7 +67,7 @@ which gusts would turn into an axial force)."""
 
 @dataclass(frozen=True)
 class AxialForce:
-    """What ax shows.
+    """Result of the comparison of ax.
 
     Attributes
     ----------
@@ -161,12 +162,8 @@ def _steady_runs(logs: Sequence[FlightLog]) -> set[str]:
 
 def _shapes(case: Case, fitted: Sequence[AxialSeries]) -> list[Shape]:
     """Functions of each signal that the records excite, over the range that they cover, with more and more cells."""
-    trims = {
-        "alpha": float(np.mean([r.plant.trim_alpha_rad for r in case.fitted.records])),
-        LONGITUDINAL.controls[0].name: float(
-            np.mean([r.pitch_plant.trim_elevator_rad for r in case.fitted.records])
-        ),
-    }
+    plants = [r.plant for r in case.fitted.records]
+    trims = {name: float(np.mean([plant.trims[name] for plant in plants])) for name in plants[0].trims}
     found = []
     for name in SIGNALS:
         low, high = covered(np.concatenate([s.signals[name] for s in fitted]))
@@ -239,7 +236,7 @@ def _weights(records: Sequence[_Means]) -> Array:
 
 
 def _residual(design: Array, x: Array) -> Array:
-    """What a least-squares fit of the columns of a design leaves of x."""
+    """Residual of x after a least-squares fit of the columns of a design."""
     return np.asarray(x - design @ np.linalg.lstsq(design, x, rcond=None)[0])
 
 
@@ -314,9 +311,10 @@ def _relative_swing(own: _Learned, case: Case, fitted: Sequence[AxialSeries]) ->
     shape = own.effect.shape
     swing = float(np.ptp(shape.basis(np.linspace(shape.low, shape.high, 101)) @ own.bends))
     low, high = covered(np.concatenate([s.signals["alpha"] for s in fitted]))
-    plant = case.fitted.records[0].pitch_plant
+    plant = case.fitted.records[0].plant
     at = np.linspace(low, high, 101)
-    declared = np.interp(at, plant.alpha_rad, plant.over_alpha[:, 0]) / plant.aircraft.constants.wing_area_m2
+    axis, forces = plant.along(FLOW)
+    declared = np.interp(at, axis, forces[:, 0]) / plant.aircraft.constants.wing_area_m2
     return swing / max(float(np.ptp(declared)), 1e-9)
 
 

@@ -25,9 +25,8 @@ from airtruth.simulation.disposable import isolated
 from airtruth.simulation.probe import forces_over_alpha
 from airtruth.tracing.compensate import Compensation, compensated_batch
 from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.plant import FLOW, Plant, looked_up
 from airtruth.tracing.model.records import FINE, TraceRecord
-from airtruth.tracing.model.remainder import looked_up
 from airtruth.tracing.model.surface import through
 from airtruth.units import DEG
 
@@ -131,7 +130,7 @@ def axial_series(
         readings=change.readings,
     )
     by_run = {r.signals.run_id: (r, p) for r, p in zip(records, own, strict=True)}
-    plants = {id(r.pitch_plant): r.pitch_plant for r in records}
+    plants = {id(r.plant): r.plant for r in records}
     between = {key: _between_points(plant) for key, plant in plants.items()}
     found: dict[str, AxialSeries] = {}
     for batch in (b for log in logs for b in batches(log)):
@@ -146,7 +145,7 @@ def axial_series(
                 ratio = channels[_SPEED] / batch.channels[_SPEED][row]
                 bias_rad = float(parameters[SHORT_PERIOD.per_record.bias][0])
                 found[run_id] = _series(
-                    channels, record, ratio, bias_rad, between[id(record.pitch_plant)], change, aircraft
+                    channels, record, ratio, bias_rad, between[id(record.plant)], change, aircraft
                 )
     return [found[r.signals.run_id] for r in records]
 
@@ -168,10 +167,11 @@ def _series(
     bias_rad : estimated bias of the vane, which is undone [rad].
     between : X between the points of the tables, see `_between_points`.
     """
-    s, plant, c = record.signals, record.pitch_plant, aircraft.constants
+    s, plant, c = record.signals, record.plant, aircraft.constants
     own = _accelerometer(aircraft)
-    factor = declared_total(change.declared, "elevator")
-    neutral = plant.neutral_elevator_rad
+    (control,) = (one.name for one in plant.motion.controls)
+    factor = declared_total(change.declared, control)
+    neutral = float(plant.neutral_rad[0])
     cells = s.sub * FINE
     surface = through(change.surface_path(), s.elevator_rad, s.dt_s / cells)[::cells]
     elevator = neutral + factor * (surface - neutral)
@@ -187,14 +187,15 @@ def _series(
 
     def along(alpha_rad: Array) -> Array:
         """X of the declared model (samples,) [N]."""
-        x, _, _ = looked_up(plant, alpha_rad, elevator, q * half, pressure)
+        x = looked_up(plant, signals | {FLOW: alpha_rad}, pressure)[:, 0]
         return np.asarray(x + pressure * np.interp(alpha_rad, *between))
 
+    signals = {FLOW: alpha, control: elevator, "qhat": q * half}
     declared = along(alpha)
-    per_alpha, per_elevator = _slopes(plant, c.wing_area_m2)
+    per_alpha, per_elevator = (_slope(plant, name) for name in (FLOW, control))
     t = TOLERANCE
     shown = _without_noise(alpha, (channels["az_m_s2"], q, elevator))
-    off_alpha, off_elevator = shown - plant.trim_alpha_rad, elevator - plant.trim_elevator_rad
+    off_alpha, off_elevator = shown - plant.trims[FLOW], elevator - plant.trims[control]
     off_bias = bias_rad if abs(bias_rad) > t.bias_rad else t.bias_rad
     inertial = mass / force
     tolerances = [
@@ -211,8 +212,8 @@ def _series(
     return AxialSeries(
         y=(mass * ax - declared) / force,
         tolerances=np.stack(tolerances, axis=1),
-        instruments={"alpha": shown},
-        signals={"alpha": alpha, "elevator": elevator, "qhat": q * half},
+        instruments={FLOW: shown},
+        signals=signals,
         unit_m_s2=force / mass,
         dt_s=s.dt_s,
     )
@@ -246,19 +247,16 @@ def _between_points(plant: Plant) -> tuple[Array, Array]:
     words = f"the axial force of {plant.aircraft.name}"
     exact = isolated(words, forces_over_alpha, plant.aircraft, at, alpha, np.ones(1))[0, :, 0]
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    still, elevator, everywhere = (np.full(len(alpha), x) for x in (0.0, at.elevator_rad, pressure))
-    tables, _, _ = looked_up(plant, alpha, elevator, still, everywhere)
+    still = {name: np.full(len(alpha), value) for name, value in plant.trims.items()}
+    tables = looked_up(plant, still | {FLOW: alpha}, np.full(len(alpha), pressure))[:, 0]
     return alpha, (exact - tables) / pressure
 
 
-def _slopes(plant: Plant, area_m2: float) -> tuple[float, float]:
-    """Declared slopes of CX over the angle of attack and over the elevator at the trim [1/rad]."""
-    over_alpha = np.gradient(plant.over_alpha[:, 0], plant.alpha_rad) / area_m2
-    over_elevator = np.gradient(plant.over_elevator[:, 0], plant.elevator_rad) / area_m2
-    return (
-        float(np.interp(plant.trim_alpha_rad, plant.alpha_rad, over_alpha)),
-        float(np.interp(plant.trim_elevator_rad, plant.elevator_rad, over_elevator)),
-    )
+def _slope(plant: Plant, signal: str) -> float:
+    """Declared slope of CX over a signal at the trim [1/rad]."""
+    axis, forces = plant.along(signal)
+    slopes = np.gradient(forces[:, 0], axis) / plant.aircraft.constants.wing_area_m2
+    return float(np.interp(plant.trims[signal], axis, slopes))
 
 
 __all__ = ["CHANNEL", "TOLERANCE", "AxialSeries", "Tolerance", "axial_series"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -11,28 +12,14 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import LogError, TrimError
 from airtruth.physics.gust_figures import gust_scales, side_gust
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.simulation.trim import Trim
-from airtruth.tracing.lateral_conditions import (
-    at_throttle,
-    flies_in_six_axes,
-    lateral_plants,
-    with_steady_flight,
-)
-from airtruth.tracing.model.lateral_plant import lateral_trim
-from airtruth.tracing.model.lateral_remainder import lateral_remainders
-from airtruth.tracing.model.plant import (
-    Plant,
-    declared_derivatives,
-    engines,
-    linear,
-    probed,
-    trim_of,
-    with_throttle,
-)
+from airtruth.tracing.model.lateral_remainder import along_record, lateral_remainders
+from airtruth.tracing.model.plant import FLOW, Plant, declared_derivatives, linear
+from airtruth.tracing.model.probed import engines, probed, probed_lateral, trim_of, with_throttle
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples
 from airtruth.tracing.model.remainder import remainders
-from airtruth.units import DEG
+from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
@@ -57,6 +44,8 @@ _FIGURES: Final = "mil-f-8785c"
 """Source of the gusts' scale lengths."""
 _GUST_ALTITUDE_M: Final = (30.0, 20000.0)
 """Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
+_MOST_BETA_RAD: Final = 0.35
+"""Largest sideslip of the tables [rad] (judgement: 20 deg; a reconstructed sideslip may drift beyond any that is flown)."""
 
 
 def records_of(
@@ -82,35 +71,34 @@ def records_of(
         members = [s for s in everyone if s.run_id not in held] or everyone
         motion = members[0].motion
         length = gust_length_m(float(np.mean([s.altitude_m for s in members])), motion)
-        made = (_in_pitch if motion is LONGITUDINAL else _in_six_axes)(
-            everyone, members, aircraft, model, length
-        )
+        at = _trim(aircraft, members) if flies(aircraft, motion) else None
+        full = [_with_steady_flight(s, at) for s in everyone]
+        own = [s for s, given in zip(full, everyone, strict=True) if any(given is m for m in members)]
+        plants = _plants(full, own, aircraft, model, at)
+        more = (remainders if motion is LONGITUDINAL else lateral_remainders)(full, plants)
+        made = (TraceRecord(s, plant, length, x) for s, plant, x in zip(full, plants, more, strict=True))
         records |= dict(zip(group, made, strict=True))
     return [records[i] for i in range(len(signals))]
 
 
-def _in_pitch(
-    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str, length_m: float
-) -> list[TraceRecord]:
-    plants = _plants(everyone, members, aircraft, model)
-    return [
-        TraceRecord(s, plant, length_m, more)
-        for s, plant, more in zip(everyone, plants, remainders(everyone, plants), strict=True)
-    ]
+def flies(aircraft: Aircraft, motion: Motion) -> bool:
+    """Whether the aircraft has a JSBSim model with the controls of a motion."""
+    model = aircraft.file.jsbsim
+    return model is not None and all(getattr(model, control.name) is not None for control in motion.controls)
 
 
-def _in_six_axes(
-    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str, length_m: float
-) -> list[TraceRecord]:
-    speed, density = _speed_and_density(members)
-    at = _trim(aircraft, members, speed, density) if flies_in_six_axes(aircraft) else None
-    steady = [with_steady_flight(s, at) for s in everyone]
-    own = [full for s, full in zip(everyone, steady, strict=True) if any(s is m for m in members)]
-    plants = lateral_plants(steady, own, aircraft, model, at)
-    return [
-        TraceRecord(s, plant, length_m, more)
-        for s, plant, more in zip(steady, plants, lateral_remainders(steady, plants), strict=True)
-    ]
+def _with_steady_flight(s: Signals, at: Trim | None) -> Signals:
+    """A run whose known inputs that the log lacks are those of a trim."""
+    if at is None or not s.assumed:
+        return s
+    steady = {
+        "alpha_rad": at.alpha_rad,
+        "theta_rad": at.alpha_rad + at.condition.gamma_rad,
+        "q_rad_s": 0.0,
+    }
+    absent = [name for name in s.assumed if name in steady]
+    changed = {name: np.full_like(getattr(s, name), steady[name]) for name in absent}
+    return replace(s, **changed)
 
 
 def _speed_and_density(members: Sequence[Signals]) -> tuple[float, float]:
@@ -135,33 +123,58 @@ def _conditions(signals: Sequence[Signals], held: Sequence[str]) -> list[list[in
 
 
 def _plants(
-    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str
+    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str, at: Trim | None
 ) -> list[Plant]:
     """The plant of each run of one flight condition; ``members`` are the runs that determine the condition."""
-    speed, density = _speed_and_density(members)
-    if model == "linear":
-        at = _trim(aircraft, members, speed, density) if aircraft.file.jsbsim is not None else None
-        derivatives = declared_derivatives(aircraft, at)
+    motion = members[0].motion
+    if model == "linear" or at is None:
+        derivatives = declared_derivatives(aircraft, at, motion)
+        if motion is LATERAL:
+            return [_linear_lateral(s, aircraft, derivatives) for s in everyone]
+        speed, density = _speed_and_density(members)
         power = None if at is None else engines(aircraft, at)
-        starts = map(_start_of, everyone)
-        return [linear(aircraft, derivatives, speed, density, *start, power) for start in starts]
-    at = _trim(aircraft, members, speed, density)
-    plant = _probed(aircraft, at, members)
-    wider = plant if len(members) == len(everyone) else _probed(aircraft, at, everyone)
+        weight = np.array([0.0, -aircraft.constants.mass_kg * G0, 0.0])
+        pressure = 0.5 * density * speed**2
+        starts = [np.array([alpha, 0.0, control]) for alpha, control in map(_start_of, everyone)]
+        return [linear(aircraft, motion, derivatives, pressure, start, weight, power) for start in starts]
+    tabulated = _probed if motion is LONGITUDINAL else _probed_lateral
+    plant = tabulated(aircraft, at, members)
+    wider = plant if len(members) == len(everyone) else tabulated(aircraft, at, everyone)
     return [plant if any(s is m for m in members) else wider for s in everyone]
 
 
 def _start_of(s: Signals) -> tuple[float, float]:
     """Mean angle of attack and elevator [rad] over the start of a run."""
     head = head_samples(s.dt_s)
-    return float(s.y[:head, 0].mean()), float(s.elevator_rad[: head * s.sub * FINE].mean())
+    return float(s.y[:head, 0].mean()), float(s.controls_rad[0, : head * s.sub * FINE].mean())
 
 
 def _probed(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
     """Tables over the angles and pitch rates that the runs reach."""
     rate = max(float(np.abs(s.y[:, 1]).max()) for s in runs)
     return probed(
-        aircraft, at, _reach([s.y[:, 0] for s in runs]), _reach([s.elevator_rad for s in runs]), rate
+        aircraft, at, _reach([s.y[:, 0] for s in runs]), _reach([s.controls_rad for s in runs]), rate
+    )
+
+
+def _linear_lateral(s: Signals, aircraft: Aircraft, derivatives: Array) -> Plant:
+    """The linear model about the start of a run, whose air holds the weight's side component there without a moment."""
+    head, c = head_samples(s.dt_s), aircraft.constants
+    start = along_record(s, c.span_m)[:, :head].mean(axis=1)
+    start[[x.length is not None for x in LATERAL.signals]] = 0.0
+    phi = float(s.y[:head, LATERAL.output_channels.index("phi_rad")].mean())
+    side = c.mass_kg * G0 * np.cos(float(s.theta_rad[: head * s.sub].mean())) * np.sin(phi)
+    pressure = 0.5 * float(s.density_kg_m3.mean()) * float(np.mean(s.airspeed_m_s**2))
+    return linear(aircraft, LATERAL, derivatives, pressure, start, np.array([-side, 0.0, 0.0]))
+
+
+def _probed_lateral(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
+    """Tables over the angles and rates that the runs reach."""
+    every = np.concatenate([along_record(s, aircraft.constants.span_m) for s in runs], axis=1)
+    reach = {x.name: _reach([row]) for x, row in zip(LATERAL.signals, every, strict=True)}
+    low, high = np.clip(reach[LATERAL.flow], -_MOST_BETA_RAD, _MOST_BETA_RAD).tolist()
+    return probed_lateral(
+        aircraft, at, {**reach, LATERAL.flow: (low, high), FLOW: _reach([s.alpha_rad for s in runs])}
     )
 
 
@@ -170,9 +183,8 @@ def _reach(series: Sequence[Array]) -> tuple[float, float]:
     return min(float(x.min()) for x in series), max(float(x.max()) for x in series)
 
 
-def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density: float) -> Trim:
-    s, is_pitch = members[0], members[0].motion is LONGITUDINAL
-    trimmed, at_lever = (trim_of, with_throttle) if is_pitch else (lateral_trim, at_throttle)
+def _trim(aircraft: Aircraft, members: Sequence[Signals]) -> Trim:
+    s, (speed, density) = members[0], _speed_and_density(members)
     climb = float(
         np.mean([m.theta_rad[: _CLIMB_SAMPLES * m.sub].mean() - _first_alpha_rad(m) for m in members])
     )
@@ -181,10 +193,10 @@ def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density:
     problems: dict[tuple[float, float], TrimError] = {}
     for tried in dict.fromkeys([(speed, gamma), level, *((v, 0.0) for v in _reached_speeds(members, speed))]):
         try:
-            at = trimmed(aircraft, tried[0], density, s.altitude_m, tried[1])
+            at = trim_of(aircraft, tried[0], density, s.altitude_m, tried[1], s.motion)
             levers = [m.throttle for m in members if m.throttle is not None]
             # the logged throttle counts, not that of the declared trim
-            return at_lever(aircraft, at, float(np.mean(levers))) if levers else at
+            return with_throttle(aircraft, at, float(np.mean(levers))) if levers else at
         except TrimError as error:
             problems[tried] = error
     raise LogError(
@@ -252,4 +264,4 @@ def gust_length_m(altitude_m: float, motion: Motion = LONGITUDINAL) -> float:
     return scales.length_w_m if motion is LONGITUDINAL else side_gust(_FIGURES, scales)[1]
 
 
-__all__ = ["condition_notes", "gust_length_m", "records_of"]
+__all__ = ["condition_notes", "flies", "gust_length_m", "records_of"]

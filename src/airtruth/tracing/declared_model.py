@@ -24,18 +24,13 @@ from airtruth.tracing.answer import (
     ParameterEstimate,
     RefinedDerivative,
 )
+from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, contradiction
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
-from airtruth.tracing.selection.explanation import DERIVATIVES, CauseSet, size_of
+from airtruth.tracing.selection.explanation import CauseSet, size_of
 from airtruth.tracing.selection.ranking import TIE
-from airtruth.tracing.selection.release import (
-    CONTRADICTED,
-    DeclaredCauses,
-    Release,
-    size_in_derivatives,
-    size_in_filter,
-)
+from airtruth.tracing.selection.release import CONTRADICTED, Release, size_in_derivatives, size_in_filter
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.weights import weights
 

@@ -1,4 +1,4 @@
-"""What the kinematics of the fitted records tell before aerodynamics: where refits begin, how far they go, and disagreement.
+"""Evidence of the kinematics of the fitted records, before aerodynamics: starts and ranges of refits, and disagreement.
 
 A refit of the derivatives can absorb a slow vane, which then has no score and is never a candidate. The kinematic check
 needs no aerodynamics and knows it. Its causes are therefore always refitted, from the declared aircraft. Where it needs no

@@ -20,17 +20,15 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.reconstruction import is_reconstructed
-from airtruth.tracing.conditions import condition_notes, records_of
+from airtruth.tracing.conditions import condition_notes, flies, records_of
+from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses, causes_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.lateral_conditions import flies_in_six_axes
 from airtruth.tracing.model.reading import measured_controls, read
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
 from airtruth.tracing.model.surface_noise import with_surface_noise
 from airtruth.tracing.options import TraceOptions
-from airtruth.tracing.selection.explanation import DERIVATIVES, causes_of
-from airtruth.tracing.selection.release import DeclaredCauses
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -159,14 +157,12 @@ def prepare(
 
 def _model_of(aircraft: Aircraft, motion: Motion, options: TraceOptions) -> tuple[str, list[str]]:
     """The model of the declared aircraft, and a note where it is not the one that the options name."""
-    if aircraft.file.jsbsim is None:
-        flies = False
-        why = "the aircraft has no JSBSim model"
-    else:
-        flies = motion is LONGITUDINAL or flies_in_six_axes(aircraft)
-        why = "the JSBSim model has no jsbsim.aileron and jsbsim.rudder in aircraft.toml"
-    if flies or options.model == "linear":
+    if flies(aircraft, motion) or options.model == "linear":
         return options.model, []
+    why = "the aircraft has no JSBSim model"
+    if aircraft.file.jsbsim is not None:
+        needed = " and ".join(f"jsbsim.{control.name}" for control in motion.controls)
+        why = f"the JSBSim model has no {needed} in aircraft.toml"
     name = "short-period" if motion is LONGITUDINAL else motion.name
     return "linear", [f"{why}: it is traced with the linear {name} model"]
 

@@ -16,7 +16,8 @@ from airtruth.physics.motion import VANES
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
 from airtruth.tracing.friction import PLAUSIBLE_RAD, is_late_vane
-from airtruth.tracing.selection.explanation import DERIVATIVES, events
+from airtruth.tracing.inference.causes import DERIVATIVES
+from airtruth.tracing.selection.explanation import events
 from airtruth.units import DEG
 
 MANY: Final = 3

@@ -97,7 +97,7 @@ class TraceResult:
         return [one.answer for one in self.motions.values()]
 
     def to_dict(self) -> dict[str, Any]:
-        """What trace.json holds (docs/trace.md); of several motions, that of each under its name."""
+        """The content of trace.json (docs/trace.md); for several motions, that of each under its name."""
         return dict(by_motion(self.answers))
 
     def plot(self) -> Figure:

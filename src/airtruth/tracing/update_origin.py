@@ -1,4 +1,4 @@
-"""What the updated aircraft states beside each of its numbers: standard deviation, records and date."""
+"""Origin of each number of the updated aircraft: standard deviation, records and date."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ _BETA: Final = REGRESSORS.index("beta_rad")
 
 @dataclass(frozen=True)
 class Known:
-    """What the log holds of the other axis, and of the sideslip.
+    """Channels of the other axis, and of the sideslip, in the log.
 
     Attributes
     ----------

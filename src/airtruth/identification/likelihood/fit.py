@@ -34,7 +34,8 @@ from airtruth.identification.likelihood.scoring import Maxima, Scored, Search, m
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.intersample import decay_of, servo_bend
-from airtruth.physics.short_period import PARAMETERS, Scale
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import Scale
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -147,7 +148,7 @@ def fit_joint(
 
 def _search(options: FilterOptions, levels: Array) -> Search:
     """Search of the derivatives and the levels about their declared values (groups, levels)."""
-    count, free = len(PARAMETERS), free_parameters(options)
+    count, free = len(LONGITUDINAL.parameters), free_parameters(options)
     return Search(
         declared=declared_values(options, levels),
         free=free,
@@ -224,7 +225,7 @@ def scored(data: Records[S], z: Array, active: Ints, free: Ints) -> Scored:
 
 
 def _estimates(maxima: Maxima, run_ids: tuple[str, ...], scale: Scale, options: FilterOptions) -> Estimates:
-    six = len(PARAMETERS)
+    six = len(LONGITUDINAL.parameters)
     gusts = options.sigma_u_m_s > 0.0 or options.sigma_w_m_s > 0.0
     return Estimates(
         method="filter-error" if gusts else "output-error",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification.likelihood.predictor import LEVELS
 from airtruth.identification.options import Options
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -124,7 +124,7 @@ class FilterOptions:
 
 def free_parameters(options: FilterOptions) -> Ints:
     """Indices of the estimated parameters: derivatives, levels unless known or 0, moment of the trim."""
-    count = len(PARAMETERS)
+    count = len(LONGITUDINAL.parameters)
     free = [np.arange(count)]
     if options.level_prior is not None:
         free.append(count + np.flatnonzero(options.levels > 0.0))
@@ -135,7 +135,7 @@ def free_parameters(options: FilterOptions) -> Ints:
 
 def prior_weights(options: FilterOptions) -> Array:
     """(free,) inverse prior variance of each of `free_parameters`; 0 for the derivatives."""
-    weights = [np.zeros(len(PARAMETERS))]
+    weights = [np.zeros(len(LONGITUDINAL.parameters))]
     if options.level_prior is not None:
         gusts = options.level_prior if options.gust_prior is None else options.gust_prior
         prior = np.full(options.levels.size, gusts)
@@ -150,7 +150,7 @@ def declared_values(options: FilterOptions, levels: Array) -> Array:
     """Centres of the prior (groups, parameters): 0, logarithms of the levels (groups, levels), 0."""
     groups = levels.shape[0]
     with np.errstate(divide="ignore"):  # a level of 0 stays 0
-        parts = [np.zeros((groups, len(PARAMETERS))), np.log(levels)]
+        parts = [np.zeros((groups, len(LONGITUDINAL.parameters))), np.log(levels)]
     if options.trim_moment_prior is not None:
         parts.append(np.zeros((groups, 1)))
     return np.concatenate(parts, axis=1)

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.physics.short_period import PARAMETERS, Scale
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import Scale
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -177,7 +178,7 @@ def short_period(
         states=("alpha", "q", "u", "w1", "w2"),
         inputs=("elevator",),
         outputs=tuple(outputs),
-        parameters=(*PARAMETERS, *levels),
+        parameters=(*LONGITUDINAL.parameters, *levels),
         logarithmic=levels,
         terms=tuple(t for t in terms if t.matrix not in "CDR" or t.row in outputs),
         start=((("u",), ((1.0,),)), (("w1", "w2"), W_START)),

@@ -192,7 +192,7 @@ def _joint_covariance(
     options: Options,
 ) -> Array:
     def projected() -> Iterator[tuple[Projected, Array]]:
-        """Of each observation, computed again for each pass: all of them together need too much memory."""
+        """Projection and factors of each observation, computed again for each pass: all of them together need too much memory."""
         for problem, observation in zip(problems, observations, strict=True):
             runs = observation.factors.shape[0]
             every = np.repeat(theta, runs, axis=0)

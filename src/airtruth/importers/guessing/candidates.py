@@ -1,4 +1,4 @@
-"""What each column may be: readings with the evidence of their name, unit and size."""
+"""Possible readings of each column, with the evidence of their name, unit and size."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def _tokens(name: str) -> Iterator[list[str]]:
 
 
 def _meanings(column: Column, words: Lexicon) -> Iterator[tuple[str, float, tuple[str, bool] | None]]:
-    """What a name may mean, its evidence, and why it is something else (and whether it still is a surface's motion)."""
+    """Possible meanings of a name, its evidence, and why it is something else (and whether it still is a surface's motion)."""
     whole = compact(column.name)
     exact = words.meanings(whole)
     topic = [t for t in re.split(r"[\W_]+", column.group.lower()) if t] if not column.variable else []

@@ -1,4 +1,4 @@
-"""What physics says of an assignment: logarithms of likelihood ratios, with the figure that each rests on.
+"""Evidence of physics on an assignment: logarithms of likelihood ratios, with the figure that each rests on.
 
 A relation y = x between a measured channel and what others require of it is compared with "unrelated, and of any size". Both
 sides are divided into blocks, and a polynomial is taken out of each, which stands for biases and the start of an integral. With n

@@ -1,4 +1,4 @@
-"""What physics says of the lateral-directional columns of an assignment.
+"""Evidence of physics on the lateral-directional columns of an assignment.
 
 With the Euler angles phi, theta, psi and the rates p, q, r in body axes (B. L. Stevens and F. L. Lewis, *Aircraft Control and
 Simulation*, 2nd ed., 2003):

@@ -234,7 +234,7 @@ class Writer:
         )
 
     def _missing(self) -> Iterator[str]:
-        """What a log needs and the guess does not have."""
+        """Channels that a log needs and the guess does not have."""
         doubted = {d.reading.channel for d in self.decisions.values()}
         for name in REQUIRED:
             if name in self.mapped:

@@ -1,4 +1,4 @@
-"""What a guess looks for: slots, what may fill each, its usual size, and how often its sign is the opposite one."""
+"""Slots of a guess: what may fill each, its usual size, and how often its sign is the opposite one."""
 
 from __future__ import annotations
 

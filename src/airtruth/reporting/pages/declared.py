@@ -14,10 +14,11 @@ from airtruth.charts import Chart, Mark
 from airtruth.identification.charts import COLOURS
 from airtruth.logs.histories import Histories
 from airtruth.physics.atmosphere import altitude_of_density_m
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.table import Number, Row, Table, flat
 from airtruth.tracing.model.declared import declared_covariance
-from airtruth.tracing.model.plant import declared_derivatives, trim_of
+from airtruth.tracing.model.plant import declared_derivatives
+from airtruth.tracing.model.probed import trim_of
 from airtruth.tracing.presentation.charts import chart_of_shifts
 
 if TYPE_CHECKING:
@@ -73,8 +74,8 @@ def declared_at(aircraft: Aircraft, histories: Histories) -> Declared:
     values = declared_derivatives(aircraft, at)
     std = np.sqrt(np.diagonal(declared_covariance(aircraft, values)))
     return Declared(
-        dict(zip(PARAMETERS, values.tolist(), strict=True)),
-        dict(zip(PARAMETERS, std.tolist(), strict=True)),
+        dict(zip(LONGITUDINAL.parameters, values.tolist(), strict=True)),
+        dict(zip(LONGITUDINAL.parameters, std.tolist(), strict=True)),
         f"{airspeed:.4g} m/s, {density:.4g} kg/m3",
     )
 
@@ -84,7 +85,7 @@ def shifts_chart(declared: Declared, estimates: pd.DataFrame) -> Chart:
     methods = list(dict.fromkeys(map(str, estimates["method"])))
     offsets = np.linspace(-_SPREAD, _SPREAD, len(methods)) if len(methods) > 1 else np.zeros(1)
     marks = []
-    for row, name in enumerate(PARAMETERS):
+    for row, name in enumerate(LONGITUDINAL.parameters):
         for k, method in enumerate(methods):
             value, low, high = (
                 (x - declared.values[name]) / declared.std[name] for x in _mean(estimates, method, name)
@@ -92,7 +93,7 @@ def shifts_chart(declared: Declared, estimates: pd.DataFrame) -> Chart:
             colour = COLOURS[k % len(COLOURS)]
             marks.append(Mark(row + float(offsets[k]), value, low, high, label=method, colour=colour))
     return chart_of_shifts(
-        PARAMETERS,
+        LONGITUDINAL.parameters,
         tuple(marks),
         f"Estimate, mean over the converged runs, with the mean interval. Declared at {declared.condition}; its "
         "standard deviation includes mass, inertia and CG.",
@@ -103,7 +104,7 @@ def shifts_table(declared: Declared, estimates: pd.DataFrame) -> Table:
     """Declared value, and mean and shift of each method."""
     methods = list(dict.fromkeys(map(str, estimates["method"])))
     rows: list[Row] = []
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         cells = [Number(declared.values[name]), Number(declared.std[name], digits=2)]
         for method in methods:
             value = _mean(estimates, method, name)[0]

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from airtruth.reporting.pages.declared import Declared
 
 _OVER_RUNS: Final = "Correlation over the converged runs."
-"""What a correlation from the scatter of the runs is."""
+"""Explanation of a correlation from the scatter of the runs."""
 _SYMBOLS: Final = {**SYMBOLS, **LATERAL_SYMBOLS, "wn_rad_s": r"$\omega_n$"}
 """Symbols of a table that has a column of units."""
 

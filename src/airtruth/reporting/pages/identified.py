@@ -1,4 +1,4 @@
-"""What a page shows of estimates: the answer, intervals, records against model, provenance."""
+"""Page of estimates: the answer, intervals, records against model, provenance."""
 
 from __future__ import annotations
 

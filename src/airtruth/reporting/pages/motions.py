@@ -15,7 +15,7 @@ from airtruth.table import Group, Row, Table, as_csv
 
 @dataclass(frozen=True)
 class Part:
-    """What a page shows of one motion.
+    """One motion on a page.
 
     Attributes
     ----------

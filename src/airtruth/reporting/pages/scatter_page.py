@@ -29,7 +29,7 @@ MOST_MARKS: Final = 60
 LEAST_RUNS: Final = 2
 """Fewest runs per derivative whose scatter gives a correlation matrix [-] (judgement)."""
 OF_METHOD: Final = "Correlation by the covariance that the method states, mean over the converged runs."
-"""What a correlation from covariances is."""
+"""Explanation of a correlation from covariances."""
 
 
 def runs_section(

@@ -33,7 +33,7 @@ from airtruth.tracing.presentation.text import detectable
 from airtruth.tracing.presentation.tolerances import tolerance_table
 
 CURE: Final = "run `airtruth trace` again to write it"
-"""What writes the files of a trace again."""
+"""Advice on writing the files of a trace again."""
 _SIMULATED: Final = (
     "declared, before, after: free runs of the declared aircraft, of the refitted one, and with the effects. Each has "
     "the same free biases, initial state and trim of the record."

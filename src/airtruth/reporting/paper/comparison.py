@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.physics import short_period
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.reporting.paper import published
 from airtruth.reporting.paper.published import ESTIMATED, Printed, PublishedColumn
@@ -106,7 +105,7 @@ def published_ratio(
 
 
 def _relerr_se_pct(column: PublishedColumn, runs: int, correlation: Array) -> float:
-    names = short_period.PARAMETERS
+    names = LONGITUDINAL.parameters
     truth = published.load().truth
     target = np.array([truth[name].value for name in names])
     bias = np.array([column.mean[name].value for name in names]) - target

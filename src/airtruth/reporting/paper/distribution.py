@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from airtruth import style
-from airtruth.physics import short_period
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting.campaign import Campaign
 from airtruth.reporting.paper.published import SYMBOLS, PublishedTable
 
@@ -52,7 +52,7 @@ def estimates(
     with style.applied():
         figure = style.new_figure(9.6, 2.4 + 0.72 * len(shown))
         axes = figure.subplots(2, 3, sharey=True)
-        for j, (ax, name) in enumerate(zip(axes.flat, short_period.PARAMETERS, strict=True)):
+        for j, (ax, name) in enumerate(zip(axes.flat, LONGITUDINAL.parameters, strict=True)):
             columns = [campaign.estimates[m].values[:, j] for m in shown]
             columns = [column[np.isfinite(column)] for column in columns]
             beside = [_printed(printed, m, name) for m in shown]

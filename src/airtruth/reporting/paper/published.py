@@ -14,9 +14,9 @@ from functools import cache
 from importlib import resources
 from typing import Any, Final
 
-from airtruth.physics import short_period
+from airtruth.physics.motion import LONGITUDINAL
 
-ESTIMATED: Final = (*short_period.PARAMETERS, *short_period.MODAL)
+ESTIMATED: Final = (*LONGITUDINAL.parameters, *LONGITUDINAL.modal)
 """The eight parameters of a column: six derivatives [-], wn [rad/s] and zeta [-]."""
 
 DECIMALS: Final[Mapping[str, int]] = {

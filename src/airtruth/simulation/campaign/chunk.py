@@ -17,7 +17,7 @@ from airtruth.logs import store
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.flight_log import PRESCRIBED, FlightLog
 from airtruth.logs.names import chunk_file
-from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.simulation import instruments as measure
 from airtruth.simulation.campaign import streams
 from airtruth.simulation.campaign.air import air_of
@@ -26,8 +26,7 @@ from airtruth.simulation.campaign.inputs import commands
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.lateral_feedback import LateralFeedback
-from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.linearise_lateral import LateralLinearisation, lateral_truth, linearise_lateral
+from airtruth.simulation.linearise import Linearisation, lateral_truth, linearise
 from airtruth.simulation.manoeuvres import ELEVATOR, LATERAL_CONTROLS, sample
 from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
@@ -100,7 +99,7 @@ class Prepared:
     trim: Trim
     linear: Linearisation
     flight: Flight
-    lateral: LateralLinearisation | None = None
+    lateral: Linearisation | None = None
 
 
 class Pilot:
@@ -190,7 +189,7 @@ class Pilot:
                 trim=at_trim,
                 linear=linearise(plan.aircraft, at_trim, plan.dt_s),
                 flight=Flight(plan.aircraft, at_trim, plan.dt_s, self._record_every),
-                lateral=linearise_lateral(plan.aircraft, at_trim, plan.dt_s) if at.six_axes else None,
+                lateral=linearise(plan.aircraft, at_trim, plan.dt_s, LATERAL) if at.six_axes else None,
             )
         self._prepared[at] = prepared
         if len(self._prepared) > _CACHED_CONDITIONS:
@@ -284,7 +283,7 @@ class FlownRun:
 
     trim: Trim
     linear: Linearisation
-    lateral: LateralLinearisation | None
+    lateral: Linearisation | None
     channels: dict[str, Array]
 
 
@@ -320,10 +319,9 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
     result: dict[str, object] = {"run_id": run.run_id, "status": "ok" if prepared else "failed"}
     sides = {"": "plus", "_minus": "minus", "_central": "central"}
     for suffix, side in sides.items():
-        values = getattr(prepared.linear, side) if prepared else np.full(len(PARAMETERS), np.nan)
-        result |= {name + suffix: float(v) for name, v in zip(PARAMETERS, values, strict=True)}
-    modal = (prepared.linear.wn_rad_s, prepared.linear.zeta) if prepared else (np.nan, np.nan)
-    result |= dict(zip(MODAL, modal, strict=True))
+        values = getattr(prepared.linear, side) if prepared else np.full(len(LONGITUDINAL.parameters), np.nan)
+        result |= {name + suffix: float(v) for name, v in zip(LONGITUDINAL.parameters, values, strict=True)}
+    result |= {name: prepared.linear.modes[name] if prepared else np.nan for name in LONGITUDINAL.modal}
     at = prepared.trim if prepared else None
     result |= {
         "trim_alpha_rad": at.alpha_rad if at else np.nan,

@@ -245,7 +245,7 @@ def finish(plan: Plan, out: Path, chunks: Collection[FlownChunk]) -> None:
 
 
 def _stated(out: Path) -> list[dict[str, Any]]:
-    """What the manifest and campaign.json state of the campaign; the manifest first, and only what is readable."""
+    """Statements of the manifest and campaign.json about the campaign; the manifest first, and only what is readable."""
     head = _recorded(out).head
     stated = [dict(head)] if head else []
     try:

@@ -1,4 +1,4 @@
-"""What the tables of a campaign file share: quantities with their unit in the key, and distributions of draws."""
+"""Common parts of the tables of a campaign file: quantities with their unit in the key, and distributions of draws."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _UNITS: Final = (("-rad", 1.0), ("-deg", DEG), ("-norm", 0.0))
 
 @dataclass(frozen=True)
 class Control:
-    """What is known of a control before a model is examined.
+    """Knowledge of a control before a model is examined.
 
     Attributes
     ----------

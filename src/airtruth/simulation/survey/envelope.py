@@ -11,7 +11,7 @@ import numpy as np
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import FlightError, TrimError
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.simulator import Condition
@@ -31,7 +31,7 @@ _TIME_S: Final = 90.0
 _ALPHA_RAD: Final = 4.0 * DEG
 """Angle of attack of the condition that is proposed for a first flight, if there is a choice [rad] (judgement: away
 from the stall and from zero lift)."""
-_CMALPHA: Final = PARAMETERS.index("Cmalpha")
+_CMALPHA: Final = LONGITUDINAL.parameters.index("Cmalpha")
 """Index of Cmalpha among the derivatives."""
 _SLACK_DEG: Final = 4.0
 """Amplitude of the doublet where slack holds the surface [deg] (judgement: twice the slack of a light aircraft's cables)."""
@@ -88,7 +88,7 @@ class FlightTest:
 
     Attributes
     ----------
-    derivatives : by the names of `airtruth.physics.short_period.PARAMETERS` [1/rad].
+    derivatives : by the names of ``LONGITUDINAL.parameters`` [1/rad].
     wn_rad_s, zeta : short period [rad/s], [-].
     duration_s, amplitude_deg : record and doublet in which it keeps to its range [s], [deg]; 0 for none.
     alpha_range_deg : range of the angle of attack in it, without input and with the doublet [deg].
@@ -162,7 +162,7 @@ def flown(aircraft: Aircraft, at: Trim) -> FlightTest:
     Where slack or hysteresis holds the surface, a larger doublet is tried.
     """
     linear = linearise(aircraft, at)
-    derivatives = dict(zip(PARAMETERS, linear.central.tolist(), strict=True))
+    derivatives = dict(zip(LONGITUDINAL.parameters, linear.central.tolist(), strict=True))
     fault, slack = "", False
     for seconds, amplitude_deg in _RECORDS:
         if amplitude_deg == _SLACK_DEG and not slack:
@@ -178,11 +178,17 @@ def flown(aircraft: Aircraft, at: Trim) -> FlightTest:
             fault = f"a doublet of {amplitude_deg:g} deg moves the surface by {0.5 * surface:.2g} deg: slack in the controls"
         elif max(still, moved) <= _MOST_RANGE_DEG:
             return FlightTest(
-                derivatives, linear.wn_rad_s, linear.zeta, seconds, amplitude_deg, (still, moved), fault
+                derivatives,
+                linear.modes["wn_rad_s"],
+                linear.modes["zeta"],
+                seconds,
+                amplitude_deg,
+                (still, moved),
+                fault,
             )
         else:
             fault = fault or f"the angle of attack moves by {max(still, moved):.0f} deg in {seconds:g} s"
-    return FlightTest(derivatives, linear.wn_rad_s, linear.zeta, 0.0, 0.0, (), fault)
+    return FlightTest(derivatives, linear.modes["wn_rad_s"], linear.modes["zeta"], 0.0, 0.0, (), fault)
 
 
 def _ranges_deg(aircraft: Aircraft, at: Trim, seconds: float, amplitude_deg: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import FlightError, TrimError
 from airtruth.physics.motion import LATERAL
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
-from airtruth.simulation.linearise_lateral import linearise_lateral
+from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.simulator import Straight, jsbsim_model
 from airtruth.simulation.survey.bench import STEP_S
@@ -76,12 +76,11 @@ def flown_laterally(aircraft: Aircraft, at: Trim) -> LateralTest:
     if found is None:
         return LateralTest(fault=fault)
     try:
-        linear = linearise_lateral(aircraft, found)
+        linear = linearise(aircraft, found, motion=LATERAL)
     except TrimError as error:
         return LateralTest(fault=str(error))
-    modes = dict(zip(LATERAL.modal, linear.modes.tolist(), strict=True))
     turn, shortest, longest = _TURN
-    wn = modes["dutch_roll_wn_rad_s"]
+    wn = linear.modes[LATERAL.modal[0]]
     step_s = round(min(max(turn / wn, shortest), longest) if wn > 0.0 else longest, 2)
     c = found.controls
     known = LateralTest(
@@ -91,7 +90,7 @@ def flown_laterally(aircraft: Aircraft, at: Trim) -> LateralTest:
         aileron_deg=found.aileron_rad / DEG,
         rudder_deg=found.rudder_rad / DEG,
         derivatives=dict(zip(LATERAL.parameters, linear.central.tolist(), strict=True)),
-        modes=modes,
+        modes=dict(linear.modes),
     )
     for seconds in _SECONDS:
         test = replace(known, duration_s=seconds, step_s=min(step_s, 0.5 * (0.5 * seconds - _START_S)))

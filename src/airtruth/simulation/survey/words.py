@@ -1,4 +1,4 @@
-"""What a survey found, as lines of its report and as campaigns."""
+"""Findings of a survey, as lines of its report and as campaigns."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What the fitted records show of their sensors before anything is traced: slow noise, corners, the error of the airspeed."""
+"""Calibration of the sensors on the fitted records before the search: slow noise, corners, the error of the airspeed."""

@@ -51,7 +51,7 @@ _DRAWS: Final = 128
 
 @dataclass(frozen=True)
 class Assessment:
-    """What one record shows of a model.
+    """Assessment of a model on one record.
 
     Attributes
     ----------
@@ -271,7 +271,7 @@ def _free_run_slopes(
 def noise_floor(
     record: TraceRecord, settings: Settings, compiled: CompiledChange, common: Array, per_record: Array
 ) -> Array:
-    """What gusts and sensors contribute to a free run to which nothing is fitted: (outputs,) standard deviations."""
+    """Contribution of gusts and sensors to a free run to which nothing is fitted: (outputs,) standard deviations."""
     linear = _linear_model(record, settings, compiled, common, per_record)
     if np.linalg.eigvals(linear.a).real.max() >= 0.0:
         return np.asarray(_UNSTABLE * np.sqrt(linear.variance))
@@ -289,7 +289,7 @@ def fitted_noise_floor(
     seed: int,
     unconstrained: Sequence[int] = (),
 ) -> Array:
-    """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (outputs,) rms.
+    """Residual of gusts and sensors in a free run to which initial state, biases and trim are fitted: (outputs,) rms.
 
     The mean over `_DRAWS` records of the linear model in its gusts, treated as `free_run` treats the measured one. An
     output that no instrument measured has the noise that the settings state of a vane.

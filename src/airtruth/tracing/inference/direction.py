@@ -53,7 +53,7 @@ class Direction:
 
 
 def change_along(null: PosteriorFit, d: Direction) -> CompiledChange:
-    """What a null and a step in a direction change."""
+    """Changes of a null and of a step in a direction."""
     sizes = np.concatenate([null.point.sizes, d.sizes(d.step)])
     return compile_change(null.hypothesis.plus(d.effect).change(sizes), null.hypothesis.motion)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.numerics.kept import Kept
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.model.compile import CompiledChange, compile_change
@@ -17,7 +18,9 @@ from airtruth.tracing.model.compile import CompiledChange, compile_change
 Array = NDArray[np.float64]
 
 _KEPT: Final = 64
-"""Number of compiled changes that a hypothesis keeps [-] (judgement: more than a point and a step in each of its sizes)."""
+"""Number of compiled changes that are kept of a hypothesis [-] (judgement: more than a point and a step in each of its sizes)."""
+_COMPILED: Final = Kept[dict[bytes, CompiledChange]]()
+"""Hypothesis -> compiled change by the bytes of its sizes."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +46,6 @@ class Hypothesis:
     trim_flow_rad: float = 0.0
     spread: Array | None = field(default=None, compare=False)
     motion: Motion = LONGITUDINAL
-    _compiled: dict[bytes, CompiledChange] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
 
     @cached_property
     def unconstrained(self) -> tuple[int, ...]:
@@ -90,16 +90,19 @@ class Hypothesis:
     def compiled(self, sizes: Array) -> CompiledChange:
         """`change` as the filter's arrays; the latest are kept, because each record asks for the same ones."""
         key = sizes.tobytes()
-        found = self._compiled.get(key)
+        latest = _COMPILED.of(self)
+        if latest is None:
+            latest = _COMPILED.keep(self, {})
+        found = latest.get(key)
         if found is None:
             found = compile_change(self.change(sizes), self.motion)
-            if len(self._compiled) >= _KEPT:
-                self._compiled.clear()
-            self._compiled[key] = found
+            if len(latest) >= _KEPT:
+                latest.clear()
+            latest[key] = found
         return found
 
     def added(self, sizes: Array) -> Change:
-        """What the effects change at these sizes, without what is declared."""
+        """Change by the effects at these sizes, without the declared one."""
         total = Change()
         for effect, values in zip(self.effects, self.values(sizes), strict=True):
             total = total + effect.change(values)

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.kept import Kept
 from airtruth.numerics.levenberg_marquardt import Status, minimise
 from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
@@ -63,8 +64,6 @@ _MOST_LOG_STEP: Final = 1.0
 (judgement)."""
 _MOST_SIZE_STEP: Final = 0.25
 """Largest step of a size over its range [-] (judgement)."""
-_START: Final = "start"
-"""Name of the derivatives at the start of a search, among what a record keeps."""
 _RIDGE: Final = 1e-12
 """Ridge on the scaled information before it is inverted [-]; far above rounding, far below any information."""
 
@@ -84,6 +83,10 @@ class _Start(NamedTuple):
     settings: Settings
     declared: Change
     sensitivities: Sensitivities | None
+
+
+_STARTS: Final = Kept[_Start]()
+"""Record -> derivatives at the start of a search."""
 
 
 @dataclass(frozen=True)
@@ -279,12 +282,12 @@ def _without_effects(
     problem: TraceProblem, index: int, plain: Hypothesis, point: Parameters
 ) -> Sensitivities | None:
     """Derivatives of one record at the start without effects, which every start with effects shares."""
-    kept = problem.records[index].kept
-    known: _Start | None = kept.get(_START)
+    record = problem.records[index]
+    known = _STARTS.of(record)
     if known is None or known.settings is not problem.settings or known.declared != plain.declared:
         start = replace(point, sizes=np.zeros(0))
         made = sensitivities_of(problem, index, plain, start, with_levels=False)
-        known = kept[_START] = _Start(problem.settings, plain.declared, made)
+        known = _STARTS.keep(record, _Start(problem.settings, plain.declared, made))
     return known.sensitivities
 
 

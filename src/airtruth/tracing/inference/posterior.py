@@ -274,7 +274,7 @@ def prior_cost(priors: Priors, point: Parameters) -> float:
 
 
 class Eliminated(NamedTuple):
-    """What recovers a record's own step from the step of the common parameters and sizes.
+    """Matrices that recover a record's own step from the step of the common parameters and sizes.
 
     Attributes
     ----------

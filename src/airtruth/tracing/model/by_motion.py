@@ -165,7 +165,7 @@ def rates(x: Array, at: AnyPoint, model: FilterModel, out: Array) -> float:
 
 @by_types(_outputs)
 def outputs(x: Array, rate: Array, force: float, at: AnyPoint, model: FilterModel, y: Array) -> None:
-    """What the sensors read without bias, lag, delay and noise, into ``y`` [units of the outputs].
+    """Readings of the sensors without bias, lag, delay and noise, into ``y`` [units of the outputs].
 
     Parameters
     ----------

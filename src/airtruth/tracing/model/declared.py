@@ -1,4 +1,4 @@
-"""What aircraft.toml declares of the derivatives of a motion, and how certain it is."""
+"""Derivatives of a motion that aircraft.toml declares, and their uncertainty."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class Uncertainty(NamedTuple):
-    """Of derivatives for which aircraft.toml states none, in the order of the motion.
+    """Uncertainty of derivatives for which aircraft.toml states none, in the order of the motion.
 
     relative : standard deviation over the value [-]; least : least standard deviation [-], which keeps the prior regular where a
     derivative is near zero.

@@ -60,7 +60,7 @@ _QHAT: Final = SIGNALS.index("qhat")
 
 
 class AircraftMoves(NamedTuple):
-    """What the parameters move of `AircraftArrays` and of the gust.
+    """Derivatives of `AircraftArrays` and of the gust in the parameters.
 
     Attributes
     ----------
@@ -344,14 +344,14 @@ def longitudinal_output_slopes(
 
 
 def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
-    """What the parameters move of `airtruth.tracing.model.response.pack_aircraft`."""
+    """Derivatives of `airtruth.tracing.model.response.pack_aircraft` in the parameters."""
     entries, row = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
-    plant = record.pitch_plant
+    plant = record.plant
     upward, lead = gust_weights(GUST_1, rolloff)
     return AircraftMoves(
         inertia=1.0 + float(common[entries.inertia]),
         turned=plant.derivatives[row] + common[row],
-        engine=np.zeros_like(plant.constant) + plant.engine,
+        engine=np.zeros_like(plant.constant) + plant.power.constant,
         mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
         upward=upward,
         lead=lead,

@@ -38,7 +38,7 @@ _LOST: Final = 1e6
 
 
 class Path(NamedTuple):
-    """What the filter used along a record; see `Gains` and `FirstUpdate`. Without samples nothing is kept.
+    """Gains that the filter used along a record; see `Gains` and `FirstUpdate`. Without samples nothing is kept.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def _settle_sensors(x: Array, out: Array, model: FilterModel) -> None:
 
 @inner
 def _reading(x: Array, value: float, i: int, model: FilterModel) -> float:
-    """What a sensor with lag, delay and correlated noise reads of an output."""
+    """Reading of an output by a sensor with lag, delay and correlated noise."""
     at = model.states.lag[i]
     if at >= 0:
         value = x[at]
@@ -128,7 +128,7 @@ def _update(x: Array, k_gain: Array, e: Array, model: FilterModel) -> bool:
 
 @inner
 def _read(x: Array, at: AnyPoint, model: FilterModel, work: Work) -> None:
-    """What the sensors read before lags, delays and correlated noise, into ``work.out``."""
+    """Readings of the sensors before lags, delays and correlated noise, into ``work.out``."""
     az = rates(x, at, model, work.rate[0])
     outputs(x, work.rate[0], az, at, model, work.out)
 

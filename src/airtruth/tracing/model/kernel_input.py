@@ -1,4 +1,4 @@
-"""What the compiled filter reads: named arrays, grouped by what they describe."""
+"""Input of the compiled filter: named arrays, grouped by what they describe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the compiled filter reads of the lateral-directional motion: its aircraft, and its inputs along a record."""
+"""Input of the compiled filter for the lateral-directional motion: its aircraft, and its inputs along a record."""
 
 from __future__ import annotations
 

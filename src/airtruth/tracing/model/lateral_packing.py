@@ -14,8 +14,8 @@ from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.kernel_input import GustModel
 from airtruth.tracing.model.lateral_equations import EQUATIONS
 from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid
-from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.parameters import CommonEntries
+from airtruth.tracing.model.plant import Plant
 
 Array = NDArray[np.float64]
 
@@ -23,13 +23,14 @@ register(LateralAircraft, LateralGrid, EQUATIONS)
 
 
 def pack_lateral(
-    plant: LateralPlant, compiled: CompiledChange, common: Array, entries: CommonEntries
+    plant: Plant, compiled: CompiledChange, common: Array, entries: CommonEntries
 ) -> LateralAircraft:
     """The declared aircraft of a flight condition, with its changes and increments.
 
     A relative change of the inertia at equal derivatives of the angular accelerations changes all inertias alike.
     """
     c, declared = plant.aircraft.constants, compiled.declared
+    points, values = plant.stacked
     inertia = float(common[entries.inertia])
     increments = common[entries.derivatives].copy()
     for row in (LATERAL.row(x.name) for x in LATERAL.coefficients if x.length is not None):
@@ -54,8 +55,8 @@ def pack_lateral(
         constant=plant.constant,
         increments=increments,
         alpha_rad=plant.alpha_rad,
-        points=plant.points,
-        values=plant.values,
+        points=points,
+        values=values,
     )
 
 

@@ -1,4 +1,4 @@
-"""What the declared JSBSim model has beyond the sum of its lateral tables, along each record.
+"""Forces of the declared JSBSim model beyond the sum of its lateral tables, along each record.
 
 The tables of `airtruth.tracing.model.lateral_plant` add up over the signals. The products of two signals that they lack, such as
 a rudder whose side force falls with the sideslip, are evaluated in JSBSim at the measured motion:
@@ -21,7 +21,7 @@ from airtruth.physics.lateral import places
 from airtruth.physics.motion import LATERAL
 from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.probe_lateral import lateral_forces
-from airtruth.tracing.model.lateral_plant import LateralPlant, looked_up_lateral
+from airtruth.tracing.model.plant import FLOW, Plant, looked_up
 from airtruth.tracing.model.records import Signals
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ def along_record(s: Signals, span_m: float) -> Array:
 
 
 def lateral_remainders(
-    signals: Sequence[Signals], plants: Sequence[LateralPlant]
+    signals: Sequence[Signals], plants: Sequence[Plant]
 ) -> list[NDArray[np.float64] | None]:
     """(3, points) increments of CY, Cl and Cn on the filter's grid of each record; None for one of the linear model.
 
@@ -53,13 +53,14 @@ def lateral_remainders(
     return [_beyond_tables(s, plant) for s, plant in zip(signals, plants, strict=True)]
 
 
-def _beyond_tables(s: Signals, plant: LateralPlant) -> Array | None:
+def _beyond_tables(s: Signals, plant: Plant) -> Array | None:
     at, c = plant.trim, plant.aircraft.constants
     if at is None:
         return None
     alpha = s.alpha_rad[:: s.sub]
     along = along_record(s, c.span_m).T
-    inside = np.clip(along, plant.points[:, 0], plant.points[:, -1])
+    points, _ = plant.stacked
+    inside = np.clip(along, points[:, 0], points[:, -1])
     to_rate = 2.0 * at.airspeed_m_s / c.span_m
     states = inside * np.array([1.0 if x.length is None else to_rate for x in LATERAL.signals])
     flown = isolated_flight(
@@ -72,7 +73,8 @@ def _beyond_tables(s: Signals, plant: LateralPlant) -> Array | None:
         states,
     )
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    tables = looked_up_lateral(plant, alpha, inside, np.full(len(alpha), pressure))
+    known = dict(zip((x.name for x in LATERAL.signals), inside.T, strict=True))
+    tables = looked_up(plant, known | {FLOW: alpha}, np.full(len(alpha), pressure))
     scale = np.array([1.0 if x.length is None else c.span_m for x in LATERAL.coefficients])
     found = (flown - tables) / (pressure * c.wing_area_m2 * scale)
     grid = np.arange((len(alpha) - 1) * s.sub + 1) / s.sub

@@ -65,7 +65,7 @@ _FLOWN: Final = 3
 
 
 class LateralMoves(NamedTuple):
-    """What the parameters move of `LateralAircraft` and of the gust.
+    """Derivatives of `LateralAircraft` and of the gust in the parameters.
 
     Attributes
     ----------
@@ -317,7 +317,7 @@ def lateral_output_slopes(
 def pack_lateral_moves(
     record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float
 ) -> LateralMoves:
-    """What the parameters move of `airtruth.tracing.model.lateral_packing.pack_lateral`."""
+    """Derivatives of `airtruth.tracing.model.lateral_packing.pack_lateral` in the parameters."""
     entries, plant = ParameterLayout(LATERAL).common, record.plant
     turned = np.zeros(len(LATERAL.derivatives))
     for row in (LATERAL.row(x.name) for x in LATERAL.coefficients if x.length is not None):

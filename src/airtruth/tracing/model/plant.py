@@ -1,38 +1,92 @@
-"""Forces of the declared aircraft over alpha, elevator and pitch rate: probed in JSBSim, or of the linear model."""
+"""Forces of the declared aircraft over the signals of a motion: a sum of tables, probed in JSBSim or of the linear model.
+
+A table has at most three signals. The forces of the pitch plane are one table over angle of attack, elevator and pitch rate;
+those of the lateral-directional motion are a table over the angle of attack and each signal.
+"""
 
 from __future__ import annotations
 
-import contextlib
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, reduce
+from itertools import product
+from operator import mul
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.errors import TrimError
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import linearise
-from airtruth.simulation.operating_point import operating_point
-from airtruth.simulation.probe import Grid, alpha_dot_terms, forces_at_speeds
-from airtruth.simulation.simulator import Condition
-from airtruth.simulation.trim import Trim, trim
+from airtruth.simulation.probe import alpha_dot_terms
+from airtruth.simulation.trim import Trim
 from airtruth.tracing.model.declared import declared_covariance, stated_derivatives
-from airtruth.units import DEG, G0
+from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-_LIFT, _MOMENT = LONGITUDINAL.row("CL"), LONGITUDINAL.row("Cm")
-"""Positions of the derivatives of lift and of the pitching moment."""
-SPEEDS: Final = np.array([0.97, 1.0, 1.03])
-"""Airspeeds over the trim's at which the engines are probed [-] (judgement): a flight test's scatter."""
-_RATE_MARGIN: Final = 1.2
-"""Range of the tables' pitch rate over the largest measured one [-] (judgement)."""
-_LEAST_RATE_RAD_S: Final = 0.05
-"""Least range of the tables' pitch rate [rad/s] (judgement)."""
-_RATES: Final = 7
-"""Points of the tables' pitch-rate axis [-] (judgement): the forces are nearly linear in it."""
+FLOW: Final = "alpha"
+"""Signal of the first axis of every table: the angle of attack."""
+FORCES: Final = 3
+"""Forces and moments of a table: X, Z and M, or Y, L and N; the coefficients of a motion are the last ones."""
+LAYOUTS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = MappingProxyType(
+    {
+        LONGITUDINAL.name: ((FLOW, LONGITUDINAL.controls[0].name, "qhat"),),
+        LATERAL.name: tuple((FLOW, signal.name) for signal in LATERAL.signals),
+    }
+)
+"""Motion -> signals of each table, in the order of its axes."""
+_ENDS: Final = np.array([-1.0, 1.0])
+"""Points of an axis of the linear model, about its trim [rad, -]."""
+_THRUST: Final = 0.1
+"""Thrust of a linear model without engines over its weight [-] (judgement: lift over drag of ten)."""
+
+
+@dataclass(frozen=True)
+class ForceTable:
+    """Forces of the air over the dynamic pressure.
+
+    Attributes
+    ----------
+    signals : names, the angle of attack first.
+    axes : (points,) ascending of each signal [rad, -].
+    values : (points of each axis, 3) X, Z [m2] and M [m3], or Y [m2], L and N [m3].
+    """
+
+    signals: tuple[str, ...]
+    axes: tuple[Array, ...]
+    values: Array
+
+    def __post_init__(self) -> None:
+        """Refuse values that the axes do not address: compiled kernels read past the end of an array.
+
+        Raises
+        ------
+        ValueError
+            Naming the shapes.
+        """
+        expected = (*(axis.size for axis in self.axes), FORCES)
+        if len(self.signals) != len(self.axes) or self.values.shape != expected:
+            raise ValueError(
+                f"table over {', '.join(self.signals)}: values have the shape {self.values.shape}, its axes need {expected}"
+            )
+
+
+@dataclass(frozen=True)
+class Engines:
+    """Forces of the engines at a trim, lines over the dynamic pressure.
+
+    Attributes
+    ----------
+    constant : (3,) X, Z [N] and M [N m] of the aircraft that do not go with the dynamic pressure.
+    thrust : (2,) thrust along body x at no dynamic pressure [N], and its slope over the dynamic pressure [m2].
+    """
+
+    constant: Array = field(default_factory=lambda: np.zeros(FORCES))
+    thrust: Array = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True)
@@ -41,257 +95,205 @@ class Plant:
 
     Attributes
     ----------
-    alpha_rad, elevator_rad, qhat : axes of the tables; qhat = q c/(2V).
-    values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.
-    constant : (alpha, 3) X, Z [N] and M [N m] at no dynamic pressure, of the lines over it that the forces follow about the trim:
-        those of the engines, and those that a propeller or the Mach number adds.
-    engine : (3,) those of the engines at the trim.
-    trim_alpha_rad, trim_elevator_rad : origin of the increments of the derivatives [rad].
-    neutral_elevator_rad : deflection that an effectiveness leaves alone [rad]: zero, for the linear model its trim.
-    alpha_shift_rad : subtracted from the measured alpha and theta [rad]; the linear model counts alpha from its trim.
-    thrust : (2,) thrust at no dynamic pressure [N], and its slope over the dynamic pressure [m2].
-    derivatives, derivative_cov : (6,) declared values and (6, 6) covariance, mass, inertia and CG
-        included.
+    aircraft, motion : the aircraft, and the motion whose forces the tables have.
+    tables : add up; that of the flow angle, the first one, has the part of the trim. All have one axis of the angle of attack.
+    constant : (alpha, 3) forces [N] and moments [N m] at no dynamic pressure, of the lines over it that the forces follow about
+        the trim: those of the engines, and those that a propeller or the Mach number adds.
+    trims : signal -> value at the trim, the origin of the increments of the derivatives [rad, -].
+    neutral_rad : (controls,) deflections that an effectiveness leaves alone [rad]: zero, for the linear model its trim.
+    derivatives, derivative_cov : (derivatives,) declared values and their covariance, mass, inertias and CG included.
     trim : of the JSBSim aircraft, None for a linear one.
+    alpha_shift_rad : subtracted from the measured angle of attack and pitch attitude [rad]; the linear model of the pitch plane
+        counts them from its trim.
+    power : engines at the trim, whose forces the pitch plane scales.
     """
 
     aircraft: Aircraft
-    alpha_rad: Array
-    elevator_rad: Array
-    qhat: Array
-    values: Array
+    motion: Motion
+    tables: tuple[ForceTable, ...]
     constant: Array
-    engine: Array
-    trim_alpha_rad: float
-    trim_elevator_rad: float
-    neutral_elevator_rad: float
-    alpha_shift_rad: float
-    thrust: Array
+    trims: Mapping[str, float]
+    neutral_rad: Array
     derivatives: Array
     derivative_cov: Array
     trim: Trim | None
+    alpha_shift_rad: float = 0.0
+    power: Engines = field(default_factory=Engines)
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not go with the axis of the angle of attack, or with the motion.
+
+        Raises
+        ------
+        ValueError
+            Naming the array and the shapes.
+        """
+        alpha, count = self.alpha_rad.size, len(self.motion.parameters)
+        for name, array, expected in (
+            *((f"axis {FLOW} of a table", table.axes[0], (alpha,)) for table in self.tables),
+            ("constant", self.constant, (alpha, FORCES)),
+            ("neutral_rad", self.neutral_rad, (len(self.motion.controls),)),
+            ("derivatives", self.derivatives, (count,)),
+            ("derivative_cov", self.derivative_cov, (count, count)),
+        ):
+            if array.shape != expected:
+                raise ValueError(f"plant: {name} has the shape {array.shape}, it needs {expected}")
+
+    @property
+    def alpha_rad(self) -> Array:
+        """(alpha,) axis of the tables [rad]."""
+        return self.tables[0].axes[0]
+
+    @property
+    def trim_alpha_rad(self) -> float:
+        """Angle of attack of the trim, as the tables count it [rad]."""
+        return self.trims[FLOW]
 
     @property
     def trim_signals(self) -> Array:
         """(signals,) origin of the increments of the derivatives, in the order of the motion [rad, -]."""
-        return np.array([self.trim_alpha_rad, 0.0, self.trim_elevator_rad])
+        return np.array([self.trims[signal.name] for signal in self.motion.signals])
 
-    @property
-    def over_alpha(self) -> Array:
-        """(alpha, 3) of the tables, at the elevator's point next to its trim and no pitch rate; on a line at the trim."""
-        return self._nearest(np.moveaxis(self._steady, 1, 0), self.elevator_rad, self.trim_elevator_rad)
+    @cached_property
+    def stacked(self) -> tuple[Array, Array]:
+        """Second axes (tables, points) and values (tables, alpha, points, 3) of tables of two signals and one size."""
+        points = np.stack([table.axes[1] for table in self.tables])
+        return points, np.ascontiguousarray(np.stack([table.values for table in self.tables]))
 
-    @property
-    def over_elevator(self) -> Array:
-        """(elevator, 3) of the tables, at the angle of attack's point next to its trim and no pitch rate; on a line at the
-        trim."""
-        return self._nearest(self._steady, self.alpha_rad, self.trim_alpha_rad)
+    def along(self, signal: str) -> tuple[Array, Array]:
+        """Points of a signal [rad, -], and (points, 3) of the sum of the tables there, the other signals at the trim.
 
-    @property
-    def _steady(self) -> Array:
-        return self._nearest(np.moveaxis(self.values, 2, 0), self.qhat, 0.0)
-
-    def _nearest(self, rows: Array, points: Array, at: float) -> Array:
-        """The row of the point next to ``at``; of the linear model, which has two points, the row between them."""
-        if self.trim is not None:
-            return np.asarray(rows[int(np.argmin(np.abs(points - at)))])
-        share = (at - points[0]) / (points[-1] - points[0])
-        return np.asarray(rows[0] + share * (rows[-1] - rows[0]))
-
-
-def trim_of(
-    aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altitude_m: float, gamma_rad: float
-) -> Trim:
-    """Trim the declared JSBSim aircraft at a measured airspeed.
-
-    Raises
-    ------
-    TrimError
-        If it cannot fly there.
-    """
-    eas = airspeed_m_s * float(np.sqrt(density_kg_m3 / 1.225))
-    at = Condition(eas, altitude_m, gamma_rad)
-    return isolated(f"the trim of {aircraft.name}", trim, aircraft, at)
+        Raises
+        ------
+        KeyError
+            If no table has the signal.
+        """
+        axes = {
+            name: axis for table in self.tables for name, axis in zip(table.signals, table.axes, strict=True)
+        }
+        axis = axes[signal]
+        at = {name: np.full(axis.size, value) for name, value in self.trims.items()}
+        return axis, _sum(self.tables, at | {signal: axis})
 
 
-def with_throttle(aircraft: Aircraft, at: Trim, throttle: float) -> Trim:
-    """A trim at another throttle.
-
-    A model with lateral properties is held straight at it, as its pilot does: the flight path takes the place of the throttle.
-    Otherwise its propeller would roll it. Where no such trim exists, and for any other model, the throttle alone is replaced.
-    """
-    if aircraft.file.jsbsim is not None and aircraft.file.jsbsim.lateral is not None:
-        with contextlib.suppress(TrimError):
-            return isolated(
-                f"the trim of {aircraft.name}", trim, aircraft, at.condition, near=at, throttle=throttle
-            )
-    return replace(at, controls=replace(at.controls, throttle=throttle))
-
-
-def probed(
-    aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: tuple[float, float], q: float
-) -> Plant:
-    """Tables of the JSBSim aircraft over the stated ranges, on whole degrees and where its own tables break.
-
-    At equal alpha, elevator and qhat the forces are lines over the dynamic pressure. Their constants are those of the settled
-    engines at the trim's angle of attack, and change with it as they do at a held speed of the engines.
+def looked_up(plant: Plant, signals: Mapping[str, Array], pressure_pa: Array) -> Array:
+    """(states, 3) forces [N] and moments [N m] of a plant, linear in each signal within a cell of its tables.
 
     Parameters
     ----------
-    alpha, elevator : lowest and highest angle [rad]; q : largest pitch rate [rad/s].
+    signals : signal -> (states,) [rad, -]; outside the tables their end cells go on.
+    pressure_pa : (states,) dynamic pressure [Pa].
     """
-
-    def whole(low: float, high: float, step: float) -> Array:
-        first, last = np.floor(low / step) - 1.0, np.ceil(high / step) + 1.0
-        return np.arange(first, last + 1.0) * step
-
-    offset = at.controls.elevator_command_rad - at.elevator_rad
-    rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _RATE_MARGIN, _LEAST_RATE_RAD_S)
-    commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
-    grid = Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))
-    point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, SPEEDS)
-    tables, declared, constants = point.tables, point.derivatives, aircraft.constants
-    power = _engines_of(at, point.at_speeds)
-    constant = power.constant + _constants_over_alpha(at, tables.alpha_rad, point.over_alpha)
-    pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    return Plant(
-        aircraft=aircraft,
-        alpha_rad=tables.alpha_rad,
-        elevator_rad=tables.elevator_rad,
-        qhat=tables.q_rad_s * constants.chord_m / (2.0 * at.airspeed_m_s),
-        values=np.ascontiguousarray((tables.values[0] - constant[:, None, None]) / pressure),
-        constant=constant,
-        engine=power.constant,
-        trim_alpha_rad=at.alpha_rad,
-        trim_elevator_rad=at.elevator_rad,
-        neutral_elevator_rad=0.0,
-        alpha_shift_rad=0.0,
-        thrust=power.thrust,
-        derivatives=declared.central,
-        derivative_cov=declared_covariance(aircraft, declared.central),
-        trim=at,
-    )
+    total = _sum(plant.tables, signals) * pressure_pa[:, None]
+    i, u = _cell(plant.alpha_rad, signals[FLOW])
+    constant = (1.0 - u)[:, None] * plant.constant[i] + u[:, None] * plant.constant[i + 1]
+    return np.asarray(total + constant)
 
 
-def _constants_over_alpha(at: Trim, alpha_rad: Array, forces: Array) -> Array:
-    """(alpha, 3) X, Z [N] and M [N m] that do not go with the dynamic pressure, less those at the trim's angle of attack.
-
-    ``forces`` (speeds, alpha, 3) are those at `SPEEDS`.
-    """
-    constant = _lines(at, forces.reshape(SPEEDS.size, -1))[0].reshape(-1, 3)
-    return np.asarray(constant - constant[int(np.argmin(np.abs(alpha_rad - at.alpha_rad)))])
-
-
-def _lines(at: Trim, rows: Array) -> Array:
-    """(2, n) values at no dynamic pressure, and slopes over it, of (speeds, n) values at `SPEEDS`."""
-    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * SPEEDS) ** 2
-    basis = np.column_stack([np.ones_like(pressures), pressures])
-    return np.asarray(np.linalg.lstsq(basis, rows, rcond=None)[0], dtype=np.float64)
+def _sum(tables: tuple[ForceTable, ...], signals: Mapping[str, Array]) -> Array:
+    total = np.zeros((signals[FLOW].size, FORCES))
+    for table in tables:
+        cells = [_cell(axis, signals[name]) for name, axis in zip(table.signals, table.axes, strict=True)]
+        for corner in product((0, 1), repeat=len(cells)):
+            shares = (u if upper else 1.0 - u for upper, (_, u) in zip(corner, cells, strict=True))
+            at = tuple(low + upper for upper, (low, _) in zip(corner, cells, strict=True))
+            total += reduce(mul, shares)[:, None] * table.values[at]
+    return total
 
 
-@dataclass(frozen=True)
-class Engines:
-    """What the engines do at a trim, lines over the dynamic pressure.
-
-    Attributes
-    ----------
-    constant : (3,) X, Z [N] and M [N m] of the aircraft that do not go with the dynamic pressure.
-    thrust : (2,) thrust along body x at none [N], and its slope over the dynamic pressure [m2].
-    """
-
-    constant: Array
-    thrust: Array
-
-
-def engines(aircraft: Aircraft, at: Trim) -> Engines:
-    """The engines of the JSBSim aircraft, from three airspeeds about a trim."""
-    work = f"the forces of the engines of {aircraft.name}"
-    return _engines_of(at, isolated(work, forces_at_speeds, aircraft, at, SPEEDS))
-
-
-def _engines_of(at: Trim, at_speeds: Array) -> Engines:
-    fitted = _lines(at, at_speeds)
-    return Engines(np.ascontiguousarray(fitted[0, :3]), np.ascontiguousarray(fitted[:, 3]))
-
-
-def alpha_dot(plant: Plant) -> Array:
-    """(2,) CL and Cm per alpha_dot c/(2V) of the declared JSBSim model, which its rate derivatives contain; 0 without one."""
-    if plant.trim is None:
-        return np.zeros(2)
-    aircraft = plant.aircraft
-    return isolated(f"the terms in alpha_dot of {aircraft.name}", alpha_dot_terms, aircraft, plant.trim)
+def _cell(axis: Array, x: Array) -> tuple[NDArray[np.intp], Array]:
+    low = np.clip(np.searchsorted(axis, x, side="right") - 1, 0, axis.size - 2)
+    return low, (x - axis[low]) / (axis[low + 1] - axis[low])
 
 
 def linear(
     aircraft: Aircraft,
+    motion: Motion,
     derivatives: Array,
-    airspeed_m_s: float,
-    density_kg_m3: float,
-    alpha: float,
-    elevator: float,
+    pressure_pa: float,
+    start: Array,
+    held: Array,
     power: Engines | None = None,
 ) -> Plant:
-    """The linear short-period model about a measured trim, as tables of two points per axis.
+    """The linear model of a motion about a measured trim, as tables of two points per axis.
 
     Parameters
     ----------
-    derivatives : (6,) declared.
-    alpha, elevator : the record's own trim [rad].
-    power : engines, whose pitching moment that of the air balances at trim; None for none, and a thrust of a
-        tenth of the weight for its arm.
+    derivatives : (derivatives,) declared [-].
+    pressure_pa : dynamic pressure of the trim [Pa].
+    start : (signals,) the record's own trim, in the order of the motion [rad, -].
+    held : (3,) forces of the air at that trim, which balance the weight [N, N m].
+    power : engines, whose moment that of the air balances at the trim; None for a tenth of the weight without a moment.
     """
-    engine_moment = 0.0 if power is None else float(power.constant[2])
-    moment = np.array([0.0, 0.0, engine_moment])
     c = aircraft.constants
-    s, chord = c.wing_area_m2, c.chord_m
-    pressure = 0.5 * density_kg_m3 * airspeed_m_s**2
-    axis = np.array([-1.0, 1.0])
-    values = np.zeros((2, 2, 2, 3))
-    for i, a in enumerate(axis):
-        for j, d in enumerate(axis):
-            for k, q in enumerate(axis):
-                x = np.array([a, q, d])
-                values[i, j, k, 1] = -s * float(derivatives[_LIFT] @ x) - c.mass_kg * G0 / pressure
-                values[i, j, k, 2] = s * chord * float(derivatives[_MOMENT] @ x) - engine_moment / pressure
+    names = [signal.name for signal in motion.signals]
+    lengths = {None: 1.0, "chord": c.chord_m, "span": c.span_m}
+    factors = [x.sign * c.wing_area_m2 * lengths[x.length] for x in motion.coefficients]
+    moment = np.zeros(FORCES)
+    if power is not None:
+        moment[-1] = power.constant[-1]
+    trims = {FLOW: 0.0} | dict(zip(names, start.tolist(), strict=True))
+    shift, trims[FLOW] = trims[FLOW], 0.0
+    tables: list[ForceTable] = []
+    for own in LAYOUTS[motion.name]:
+        axes = tuple(trims[name] + _ENDS for name in own)
+        values = np.zeros((*[2] * len(own), FORCES))
+        for corner in product((0, 1), repeat=len(own)):
+            moved = dict(zip(own, _ENDS[list(corner)], strict=True))
+            x = np.array([moved.get(name, 0.0) for name in names])
+            rows = derivatives.reshape(motion.shape)
+            values[corner][FORCES - len(rows) :] = [
+                f * float(row @ x) for f, row in zip(factors, rows, strict=True)
+            ]
+        if not tables:
+            values += (held - moment) / pressure_pa
+        tables.append(ForceTable(own, axes, values))
     return Plant(
         aircraft=aircraft,
-        alpha_rad=axis,
-        elevator_rad=axis + elevator,
-        qhat=axis,
-        values=values,
+        motion=motion,
+        tables=tuple(tables),
         constant=np.tile(moment, (2, 1)),
-        engine=moment,
-        trim_alpha_rad=0.0,
-        trim_elevator_rad=elevator,
-        neutral_elevator_rad=elevator,
-        alpha_shift_rad=alpha,
-        thrust=np.array([0.1 * c.mass_kg * G0, 0.0]) if power is None else power.thrust,
-        derivatives=np.asarray(derivatives, dtype=np.float64),
-        derivative_cov=declared_covariance(aircraft, np.asarray(derivatives)),
+        trims=trims,
+        neutral_rad=np.array([trims[control.name] for control in motion.controls]),
+        derivatives=derivatives,
+        derivative_cov=declared_covariance(aircraft, derivatives, motion),
         trim=None,
+        alpha_shift_rad=shift,
+        power=Engines(moment, np.array([_THRUST * c.mass_kg * G0, 0.0]) if power is None else power.thrust),
     )
 
 
-def declared_derivatives(aircraft: Aircraft, at: Trim | None) -> Array:
-    """(6,) of the JSBSim model at a trim, or as aircraft.toml states them.
+def alpha_dot(plant: Plant) -> Array:
+    """(coefficients,) per alpha_dot c/(2V) of a JSBSim model of the pitch plane, which its rate derivatives contain; else 0."""
+    if plant.trim is None or plant.motion is not LONGITUDINAL:
+        return np.zeros(len(plant.motion.coefficients))
+    aircraft = plant.aircraft
+    return isolated(f"the terms in alpha_dot of {aircraft.name}", alpha_dot_terms, aircraft, plant.trim)
+
+
+def declared_derivatives(aircraft: Aircraft, at: Trim | None, motion: Motion = LONGITUDINAL) -> Array:
+    """(derivatives,) of the JSBSim model at a trim, or as aircraft.toml states them [-].
 
     Raises
     ------
     AircraftError
         If neither is there.
     """
-    if at is not None:
-        return isolated(f"the derivatives of {aircraft.name}", linearise, aircraft, at).central
-    return stated_derivatives(aircraft, LONGITUDINAL)
+    if at is None:
+        return stated_derivatives(aircraft, motion)
+    work = f"the derivatives of the {motion.name} motion of {aircraft.name}"
+    return isolated(work, linearise, aircraft, at, motion=motion).central
 
 
 __all__ = [
-    "SPEEDS",
+    "FLOW",
+    "FORCES",
+    "LAYOUTS",
+    "Engines",
+    "ForceTable",
     "Plant",
     "alpha_dot",
     "declared_derivatives",
     "linear",
-    "probed",
-    "trim_of",
-    "with_throttle",
+    "looked_up",
 ]

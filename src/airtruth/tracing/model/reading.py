@@ -34,7 +34,7 @@ _QUIET_STD: Final = 3.0
 
 
 class MeasuredControl(NamedTuple):
-    """What is declared of a control's sensor and servo.
+    """Declared sensor and servo of a control.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class MeasuredControl(NamedTuple):
 
 
 def measured_controls(aircraft: Aircraft, motion: Motion) -> tuple[MeasuredControl, ...]:
-    """What aircraft.toml declares of the controls of a motion."""
+    """Controls of a motion as aircraft.toml declares them."""
     found = []
     for control in motion.controls:
         sensor = aircraft.file.sensors.get(control.channel)

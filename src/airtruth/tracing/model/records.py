@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from airtruth.checks.airspeed import WalkInNoise
 from airtruth.physics.motion import LONGITUDINAL, Motion
-from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.plant import Plant
 
 Array = NDArray[np.float64]
@@ -158,29 +157,12 @@ class TraceRecord:
     gust_length_m : scale length of the gust that the filter estimates there [m].
     remainder : (coefficients, points) on the filter's grid, which the declared JSBSim model has along this record beyond the
         plant's tables (`airtruth.tracing.model.remainder`), from the lead on; None for none.
-    kept : what was computed from the record alone, by name; no part of its value.
     """
 
     signals: Signals
-    plant: Plant | LateralPlant
+    plant: Plant
     gust_length_m: float
     remainder: Array | None = None
-    kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
-
-    @property
-    def pitch_plant(self) -> Plant:
-        """The plant of a record of the pitch plane.
-
-        Raises
-        ------
-        TypeError
-            If the record is one of another motion.
-        """
-        if not isinstance(self.plant, Plant):
-            raise TypeError(
-                f"a record of the {self.signals.motion.name} motion has no plant of the pitch plane"
-            )
-        return self.plant
 
     @property
     def samples(self) -> int:

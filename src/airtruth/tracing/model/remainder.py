@@ -1,4 +1,4 @@
-"""What the declared JSBSim model does beyond the tables of its forces at rest, along each record.
+"""Forces of the declared JSBSim model beyond the tables of its states at rest, along each record.
 
 The declared aircraft is flown in JSBSim through the surface and at the airspeed of the record. At each time the forces
 that it has are compared with those of the tables at its own angle of attack, surface and pitch rate:
@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.physics.readings import state_of
-from airtruth.physics.terms import Change
 from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.replay import Track, each_flown_through, substeps
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.increment_response import increments
-from airtruth.tracing.model.plant import Plant, probed
+from airtruth.tracing.model.plant import LAYOUTS, Plant, looked_up
+from airtruth.tracing.model.probed import probed
 from airtruth.tracing.model.records import FINE, Signals
 from airtruth.tracing.model.surface import through
 
@@ -74,9 +74,9 @@ def _beyond_tables(signals: Signals, plant: Plant, at: Trim, flown: Mapping[str,
     half = 0.5 * c.chord_m / speed
     change = declared_dynamics(plant.aircraft.file.dynamics)
     surface = through(change.surface, flown["elevator_rad"], dt_s)
-    qhat = flown["q_rad_s"] * half
-    tables = _reaching(plant, at, flown["alpha_rad"], surface, flown["q_rad_s"])
-    _, fz, moment = looked_up(tables, flown["alpha_rad"], surface, qhat, pressure)
+    (names,) = LAYOUTS[plant.motion.name]
+    motion = dict(zip(names, (flown["alpha_rad"], surface, flown["q_rad_s"] * half), strict=True))
+    _, fz, moment = looked_up(_reaching(plant, at, motion, flown["q_rad_s"]), motion, pressure).T
     force = pressure * c.wing_area_m2
     found = np.stack(
         [
@@ -85,26 +85,27 @@ def _beyond_tables(signals: Signals, plant: Plant, at: Trim, flown: Mapping[str,
         ]
     )
     if change.aero:
-        found -= _declared(change, flown, surface, qhat, pressure, half, dt_s)
+        turn = np.gradient(flown["alpha_rad"], dt_s) * half
+        known = motion | {plant.motion.flow_rate: turn, "qbar": pressure}
+        signals_ = {name: x[None] for name, x in known.items()}
+        signals_ |= {s.name: state_of(s, signals_[s.signal], dt_s) for s in change.states}
+        found -= increments(change.aero, signals_)[:, 0]
     grid = np.arange((signals.y.shape[0] - 1) * signals.sub + 1) * (signals.dt_s / signals.sub)
     time = np.arange(found.shape[1]) * dt_s
     return np.stack([np.interp(grid, time, row) for row in found])
 
 
-def _reaching(plant: Plant, at: Trim, alpha_rad: Array, surface_rad: Array, q_rad_s: Array) -> Plant:
+def _reaching(plant: Plant, at: Trim, motion: Mapping[str, Array], q_rad_s: Array) -> Plant:
     """The plant, with wider tables where the declared model flies beyond those that the record needs.
 
     At the wrong airspeed, mass or CG it may reach angles that were never flown. Extrapolated tables would turn into a remainder.
     """
-
-    def within(axis: Array, x: Array) -> bool:
-        return bool(axis[0] <= x.min() and x.max() <= axis[-1])
-
-    rates = plant.qhat * (2.0 * at.airspeed_m_s / plant.aircraft.constants.chord_m)
-    axes = ((plant.alpha_rad, alpha_rad), (plant.elevator_rad, surface_rad), (rates, q_rad_s))
-    if all(within(axis, x) for axis, x in axes):
+    (table,) = plant.tables
+    to_trim = 0.5 * plant.aircraft.constants.chord_m / at.airspeed_m_s
+    reached = [*(motion[name] for name in table.signals[:-1]), q_rad_s * to_trim]
+    if all(axis[0] <= x.min() and x.max() <= axis[-1] for axis, x in zip(table.axes, reached, strict=True)):
         return plant
-    alpha, elevator = ((float(x.min()), float(x.max())) for x in (alpha_rad, surface_rad))
+    alpha, elevator = ((float(x.min()), float(x.max())) for x in reached[:-1])
     return probed(plant.aircraft, at, alpha, elevator, float(np.abs(q_rad_s).max()))
 
 
@@ -126,51 +127,4 @@ def track_of(signals: Signals) -> Track:
     )
 
 
-def _declared(
-    change: Change,
-    flown: Mapping[str, Array],
-    surface: Array,
-    qhat: Array,
-    pressure: Array,
-    half: Array,
-    dt_s: float,
-) -> Array:
-    """(2, steps) increments of the dynamics that aircraft.toml declares, along the flown motion."""
-    alpha = flown["alpha_rad"]
-    signals = {
-        "alpha": alpha[None],
-        "elevator": surface[None],
-        "qhat": qhat[None],
-        "alpha_dot_hat": (np.gradient(alpha, dt_s) * half)[None],
-        "qbar": pressure[None],
-    }
-    signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in change.states}
-    return increments(change.aero, signals)[:, 0]
-
-
-def looked_up(
-    plant: Plant, alpha_rad: Array, elevator_rad: Array, qhat: Array, pressure_pa: Array
-) -> tuple[Array, Array, Array]:
-    """X, Z [N] and M [N m], trilinear in the tables of a plant.
-
-    Parameters
-    ----------
-    alpha_rad, elevator_rad, qhat : (points,); outside the tables their end cells go on.
-    pressure_pa : (points,) dynamic pressure [Pa].
-    """
-    axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
-    cells = []
-    for axis, x in zip(axes, (alpha_rad, elevator_rad, qhat), strict=True):
-        low = np.clip(np.searchsorted(axis, x, side="right") - 1, 0, axis.size - 2)
-        cells.append((low, (x - axis[low]) / (axis[low + 1] - axis[low])))
-    (i, u), (j, v), (k, w) = cells
-    total = np.zeros((alpha_rad.size, 3))
-    for a, b, c in np.ndindex(2, 2, 2):
-        share = (u if a else 1.0 - u) * (v if b else 1.0 - v) * (w if c else 1.0 - w)
-        total += share[:, None] * plant.values[i + a, j + b, k + c]
-    total *= pressure_pa[:, None]
-    total += (1.0 - u)[:, None] * plant.constant[i] + u[:, None] * plant.constant[i + 1]
-    return total[:, 0], total[:, 1], total[:, 2]
-
-
-__all__ = ["looked_up", "remainders", "track_of"]
+__all__ = ["remainders", "track_of"]

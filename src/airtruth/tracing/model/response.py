@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.numerics.kept import Kept
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.tracing.model import filter as record_filter
 from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
@@ -28,7 +29,6 @@ from airtruth.tracing.model.kernel_input import (
 )
 from airtruth.tracing.model.lateral_input import LateralGrid
 from airtruth.tracing.model.lateral_packing import pack_lateral, side_gusts
-from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
@@ -42,8 +42,6 @@ Array = NDArray[np.float64]
 
 LOST: Final = 1e9
 """Residual of a sample that a lost motion does not reach [unit of the output] (judgement: beyond any that counts)."""
-_AS_MEASURED: Final = "filter inputs"
-"""Name of the inputs that no change of sensors or surface affects, among what a record keeps."""
 _MOST_SLOW: Final = 0.99
 """Largest share of correlated noise [-]: beyond the search's bound, where the differences need a slope."""
 
@@ -85,7 +83,7 @@ class Response:
 
 @dataclass(frozen=True)
 class FilterInputs:
-    """What a record and a change give to the filter, whatever the parameters are.
+    """Input of the filter from a record and a change, independent of the parameters.
 
     Attributes
     ----------
@@ -112,14 +110,28 @@ def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> Filte
     """Undo what a change says of the inputs' sensors, and put what it says of the surface behind the elevator."""
     compiled = change if isinstance(change, CompiledChange) else compile_change(change, record.signals.motion)
     if any(compiled.surface) or compiled.inputs:
-        return _inputs(record, compiled)
-    as_measured: FilterInputs | None = record.kept.get(_AS_MEASURED)
-    if as_measured is None:
-        as_measured = record.kept[_AS_MEASURED] = _inputs(record, compiled)
-    return replace(as_measured, compiled=compiled)
+        return FilterInputs(record, compiled, *_inputs(record, compiled))
+    made = _AS_MEASURED.of(record) or _AS_MEASURED.keep(record, _inputs(record, compiled))
+    return FilterInputs(record, compiled, *made)
 
 
-def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
+class _Inputs(NamedTuple):
+    """`FilterInputs` without the record and the change."""
+
+    y: Array
+    lead: int
+    grid: AnyGrid
+    corner_rad2: Array
+    reference_flow_rad: float
+    reference: AnyPoint
+    along: Schedule
+
+
+_AS_MEASURED: Final = Kept[_Inputs]()
+"""Record -> inputs that no change of sensors or surface affects."""
+
+
+def _inputs(record: TraceRecord, compiled: CompiledChange) -> _Inputs:
     s, shift = record.signals.with_lead, record.plant.alpha_shift_rad
     y, theta = s.y, s.theta_rad
     if shift != 0.0:
@@ -145,7 +157,7 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
         corner = np.concatenate([np.zeros((len(corner), lead)), corner[:, lead:]], axis=1)
     reference = equations_of_grid(grid).point(**means)
     along = schedule(y[:, 0], grid, s.sub)
-    return FilterInputs(record, compiled, y, lead, grid, corner, float(y[:, 0].mean()), reference, along)
+    return _Inputs(y, lead, grid, corner, float(y[:, 0].mean()), reference, along)
 
 
 def _surfaces(s: Signals, compiled: CompiledChange) -> Iterator[Array]:
@@ -275,7 +287,7 @@ def kernel_input(
     per_record: Array,
     external: External | None = None,
 ) -> KernelInput:
-    """What the compiled filter reads."""
+    """Input of the compiled filter."""
     trim = per_record[settings.layout.per_record.trim]
     more = np.zeros_like(given.y)
     named = zip(coefficients_of(given.grid), trim, strict=True)
@@ -312,7 +324,7 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
         rotary=0.5 + float(common[entries.rotary]),
         rotary_time_s=4.0 * constants.span_m / (np.pi * given.reference.airspeed_m_s),
     )
-    if isinstance(record.plant, LateralPlant):
+    if record.plant.motion is LATERAL:
         aircraft = pack_lateral(record.plant, compiled, common, entries)
         gusts = side_gusts(gusts, constants.span_m)
     else:
@@ -330,6 +342,8 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
     """The declared aircraft of a flight condition, with its changes and increments."""
     c, declared = plant.aircraft.constants, compiled.declared
     entries, moment = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
+    (table,), trims = plant.tables, plant.trims
+    alpha, control, rate = table.axes
     inertia = float(common[entries.inertia])
     increments = common[entries.derivatives].copy()
     increments[moment] += inertia * (plant.derivatives[moment] + common[moment])
@@ -339,19 +353,19 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
         mass_kg=c.mass_kg * declared["mass"],
         inertia_kg_m2=c.inertia_yy_kg_m2 * (declared["inertia"] * (1.0 + inertia)),
         trim_alpha_rad=plant.trim_alpha_rad,
-        trim_elevator_rad=plant.trim_elevator_rad,
-        neutral_elevator_rad=plant.neutral_elevator_rad,
+        trim_elevator_rad=trims[table.signals[1]],
+        neutral_elevator_rad=float(plant.neutral_rad[0]),
         effectiveness=declared["elevator"],
         cg_shift=declared["cg"],
         thrust_arm_m=declared["thrust_arm"],
-        thrust_n=float(plant.thrust[0]),
-        thrust_slope_m2=float(plant.thrust[1]),
-        constant=plant.constant + common[entries.thrust] * plant.engine,
+        thrust_n=float(plant.power.thrust[0]),
+        thrust_slope_m2=float(plant.power.thrust[1]),
+        constant=plant.constant + common[entries.thrust] * plant.power.constant,
         increments=increments,
-        alpha_rad=plant.alpha_rad,
-        elevator_rad=plant.elevator_rad,
-        qhat=plant.qhat,
-        values=plant.values,
+        alpha_rad=alpha,
+        elevator_rad=control,
+        qhat=rate,
+        values=table.values,
     )
 
 

@@ -246,7 +246,7 @@ def _condition(own: Conditions, moves: Moves) -> Condition:
 def _moved(
     kernel: KernelInput, aircraft: AircraftMoves | LateralMoves, noise: _Noise, places: _Places
 ) -> Moved:
-    """What the parameters move beside the gains."""
+    """Derivatives in the parameters of everything but the gains."""
     spare, n, count = places.h.size - 1, kernel.model.states.size, kernel.model.sensors.scale.size
     start, bias = np.zeros((n, width_of(spare))), np.full(count, spare, dtype=np.int64)
     at_rest, none = initial_state(kernel, np.zeros(kernel.start.size)), np.zeros(kernel.start.size)

@@ -48,7 +48,7 @@ class GainSlopes(NamedTuple):
 
 
 class Moved(NamedTuple):
-    """What the parameters move beside the gains.
+    """Derivatives in the parameters of everything but the gains.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is declared of sensors, gusts and aircraft: settings, priors, and where a search starts."""
+"""Declared sensors, gusts and aircraft of a trace: settings, priors, and the start of a search."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ _FIRST_SAMPLES: Final = 5
 
 @dataclass(frozen=True)
 class Settings:
-    """What is declared of sensors and gusts, the same for all records.
+    """Declared sensors and gusts, the same for all records.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ def resolved(settings: Settings, records: Sequence[TraceRecord]) -> Settings:
 def declared_change(
     aircraft: Aircraft, motion: Motion = LONGITUDINAL, *, absent: Collection[str] = ()
 ) -> Change:
-    """What aircraft.toml declares beyond forces at rest: the sensors' position, lag, delay and scale, the dynamics.
+    """Declarations of aircraft.toml beyond forces at rest: the sensors' position, lag, delay and scale, the dynamics.
 
     Parameters
     ----------

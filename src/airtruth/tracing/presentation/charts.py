@@ -122,7 +122,7 @@ def _without_effect(answer: TraceAnswer, histories: Histories) -> Chart:
 
 
 def _meanings(stages: Iterable[str]) -> str:
-    """What the stages are, as a sentence."""
+    """Explanation of the stages, as a sentence."""
     return "; ".join(MEANING[name] for name in stages if name in MEANING).capitalize() + "."
 
 

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LATERAL
-from airtruth.physics.motion_parts import Coefficient
 from airtruth.physics.terms import AeroTerm
-from airtruth.tracing.model.lateral_plant import LateralPlant
-from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.plant import FORCES, Plant
 from airtruth.tracing.model.records import TraceRecord
 
 Array = NDArray[np.float64]
@@ -62,41 +59,24 @@ def curve_of(record: TraceRecord, term: AeroTerm) -> Curve:
         if channel in outputs
         else s.controls_rad[[c.channel for c in s.motion.controls].index(channel)]
     )
-    coefficient = next((c for c in s.motion.coefficients if c.name == term.coefficient), None)
     is_state = channel in [state.channel for state in s.motion.states]
     shift = plant.alpha_shift_rad if is_state else 0.0
-    over, declared = (
-        _of_tables(plant, number, coefficient)
-        if isinstance(plant, LateralPlant)
-        else _of_forces(plant, is_state, coefficient)
-    )
+    over, forces = plant.along(term.signal)
+    declared = _coefficient(forces, plant, term.coefficient)
     low, high = float(measured.min()), float(measured.max())
     # the linear model holds everywhere
     ends = (over[0], over[-1]) if plant.trim is not None else (low - shift, high - shift)
     return Curve(over, declared, ends, float(plant.trim_signals[number]), shift, (low, high))
 
 
-def _of_forces(plant: Plant, over_alpha: bool, coefficient: Coefficient | None) -> tuple[Array, Array]:
-    """Points and declared coefficient of the pitch plane; no coefficient of the motion is the axial force."""
-    c = plant.aircraft.constants
-    over = plant.alpha_rad if over_alpha else plant.elevator_rad
-    column = plant.over_alpha if over_alpha else plant.over_elevator
-    if coefficient is None:
-        return over, np.asarray(column[:, 0] / c.wing_area_m2)
-    if coefficient.length is not None:
-        return over, np.asarray(column[:, 2] / (c.wing_area_m2 * c.chord_m))
-    return over, np.asarray(coefficient.sign * column[:, 1] / c.wing_area_m2)
-
-
-def _of_tables(plant: LateralPlant, signal: int, coefficient: Coefficient | None) -> tuple[Array, Array]:
-    """Points and declared coefficient of a table of the lateral-directional motion at the trim's angle of attack."""
-    c = plant.aircraft.constants
-    rows = [one.name for one in LATERAL.coefficients]
-    row = 0 if coefficient is None else rows.index(coefficient.name)
-    length = 1.0 if coefficient is None or coefficient.length is None else c.span_m
-    table = plant.values[signal, :, :, row] / (c.wing_area_m2 * length)
-    at = np.array([np.interp(plant.trim_alpha_rad, plant.alpha_rad, column) for column in table.T])
-    return plant.points[signal], at
+def _coefficient(forces: Array, plant: Plant, name: str) -> Array:
+    """A coefficient of the body axes of forces over the dynamic pressure (points, 3); one that is none of the motion is CX."""
+    c, motion = plant.aircraft.constants, plant.motion
+    lengths = {None: 1.0, "chord": c.chord_m, "span": c.span_m}
+    first = FORCES - len(motion.coefficients)
+    rows = {x.name: (first + row, x.sign * lengths[x.length]) for row, x in enumerate(motion.coefficients)}
+    row, factor = rows.get(name, (0, 1.0))
+    return np.asarray(forces[:, row] / (c.wing_area_m2 * factor))
 
 
 __all__ = ["Curve", "angles_of", "curve_of"]

@@ -141,7 +141,7 @@ def learned_panel(effect: AcceptedEffect, table: IncrementTable | None) -> Panel
 
 
 def _subject(effect: AcceptedEffect) -> tuple[str, float]:
-    """What a learned increment changes, with its display unit, and the factor to this unit from SI."""
+    """Quantity that a learned increment changes, with its display unit, and the factor to this unit from SI."""
     acts_on, by = effect.acts_on or "", effect.by or ""
     if acts_on in OUTPUTS and not by:
         return shown(acts_on)

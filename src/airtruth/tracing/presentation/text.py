@@ -13,11 +13,11 @@ from airtruth.physics.terms import OUTPUTS
 from airtruth.table import WIDTH, as_text, significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
 from airtruth.tracing.answer import ANOMALY_LEVEL, Evidence, TraceAnswer
+from airtruth.tracing.inference.causes import DERIVATIVES
 from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import axial_words, error_table
 from airtruth.tracing.presentation.tolerances import tolerance_table
-from airtruth.tracing.selection.explanation import DERIVATIVES
 from airtruth.units import printed
 
 MOST_CANDIDATES: Final = 8
@@ -104,7 +104,7 @@ def headline(answer: TraceAnswer) -> str:
 
 
 def _kind(answer: TraceAnswer) -> str:
-    """What an answer with effects states about them."""
+    """Lines about the effects of an answer."""
     return "Learned" if answer.verdict == "learned" else "One of several" if _alike(answer) else "Traced"
 
 
@@ -128,7 +128,7 @@ def _contradiction(answer: TraceAnswer) -> str:
 
 
 def _causes(answer: TraceAnswer) -> str:
-    """What the declared aircraft lacks, and what explains its derivatives."""
+    """Lines about the effects that the declared aircraft lacks, and about its derivatives."""
     lacks = [e.key for e in answer.effects if not _in_derivatives(e.name) and e.acts_on is None]
     learned = [f"an increment of {e.variant}" for e in answer.effects if e.acts_on is not None]
     lacks += [f"{_listed(learned)}, which no effect of the library describes"] if learned else []

@@ -19,7 +19,7 @@ from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, on
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
-from airtruth.tracing.model.plant import Plant, alpha_dot
+from airtruth.tracing.model.plant import alpha_dot
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.score_test import Score
 
@@ -251,7 +251,7 @@ def declared_part(problem: TraceProblem, effect: Effect) -> float:
             like = (term.coefficient, term.signal)
             own = sum(t.amplitude for t in stated if (t.coefficient, t.signal) == like)
             row = [c.name for c in motion.coefficients].index(term.coefficient)
-            return own + (float(alpha_dot(plant)[row]) if isinstance(plant, Plant) else 0.0)
+            return own + float(alpha_dot(plant)[row])
     return 0.0
 
 

@@ -19,26 +19,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from airtruth.effects.effect import Prior
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import Motion
+from airtruth.tracing.inference.causes import DERIVATIVES, Cause
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
 
 Array = NDArray[np.float64]
 Subset = tuple[int, ...]
 """Numbers of derivatives."""
 
-DERIVATIVES: Final = "derivatives"
-"""Key of the effect that states wrong declarations of derivatives."""
 WRONG_BY: Final = (3.0, 10.0)
 """Standard deviation of a derivative whose declaration is wrong, over the declared one [-]: equal parts of a mixture
 (judgement: published uncertainties of derivatives are often too small by the first factor, and by up to the second)."""
 MOST_CAUSES: Final = 3
 """Largest number of physical causes in a set, besides wrong declarations [-] (judgement: six derivatives do not tell
 more apart)."""
-_LOG_SAME_EVENT: Final = -1.0
+LOG_SAME_EVENT: Final = -1.0
 """Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
-_LOG_WRONG: Final = -1.0
+LOG_WRONG: Final = -1.0
 """Logarithm of the prior odds of wrong declarations, and of each derivative that they concern [-] (judgement: they are
 the most frequent cause)."""
 REFERENCE: Final = 4.0
@@ -57,28 +55,6 @@ _NEGLIGIBLE: Final = 60.0
 """
 _LEAST_SHARE: Final = 1e-15
 """Least probability of the plausible range of a size [-] (judgement: below it a set is out of the question)."""
-
-
-@dataclass(frozen=True)
-class Cause:
-    """A physical cause that moves several derivatives together.
-
-    Attributes
-    ----------
-    key : of the effect; direction : (derivatives,) change of the derivatives per unit of size.
-    prior, event : as of `airtruth.effects.effect.Effect`.
-    """
-
-    key: str
-    direction: Array
-    prior: Prior
-    event: str = ""
-
-    def most_probable(self, size: float, std: float) -> float:
-        """Size within its plausible range that is most probable, where records tell ``size`` with an error of ``std`` [-]."""
-        prior = self.prior
-        told = size * prior.std**2 / (prior.std**2 + std**2)
-        return min(max(told, prior.low), prior.high)
 
 
 @dataclass(frozen=True)
@@ -114,21 +90,6 @@ class CauseSet:
             sizes=tuple(self.sizes[i] for i in kept),
             size_std=tuple(self.size_std[i] for i in kept),
         )
-
-
-def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
-    """Every effect with a prior as a cause of the derivatives of a motion, those of one event first.
-
-    Parameters
-    ----------
-    directions : of the motion, see `airtruth.physics.composition.directions`.
-    """
-    effects = sorted(EFFECTS.values(), key=lambda e: not e.event)
-    return tuple(
-        Cause(e.key, directions[e.quantity], e.prior, e.event)
-        for e in effects
-        if e.prior is not None and e.quantity in directions
-    )
 
 
 def explain(
@@ -171,13 +132,25 @@ def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
     weights: dict[tuple[str, ...], float] = {}
     for s in sets:
         weights[s.effects] = weights.get(s.effects, 0.0) + float(np.exp(least - s.cost))
+    names = simplest(weights)
+    first = min((s for s in sets if s.effects == names), key=lambda s: s.cost)
+    return (first, *(s for s in sets if s is not first))
+
+
+def simplest(weights: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
+    """The set of the fewest events against which the odds of the most probable one are not strong.
+
+    Of sets of as many events, it has the fewest effects that are half as probable as the best of them.
+
+    Parameters
+    ----------
+    weights : names of each set -> its posterior weight; at least one set.
+    """
     enough = AS_PROBABLE * max(weights.values())
     fewest = min(events(n) for n, w in weights.items() if w >= enough)
     among = {n: w for n, w in weights.items() if w >= enough and events(n) == fewest}
     likely = _AS_PROBABLE_IN_EVENT * max(among.values())
-    names = min((n for n, w in among.items() if w >= likely), key=lambda n: (len(n), -among[n]))
-    first = min((s for s in sets if s.effects == names), key=lambda s: s.cost)
-    return (first, *(s for s in sets if s is not first))
+    return min((n for n, w in among.items() if w >= likely), key=lambda n: (len(n), -among[n]))
 
 
 def events(effects: Sequence[str]) -> int:
@@ -328,7 +301,7 @@ def _evidence(
     occam = 0.5 * (np.linalg.slogdet(turned)[1] - least)
     in_range = _in_range(chosen, sizes, std)
     wrong = np.array([len(subset) for subset in subsets])
-    odds = _log_odds(chosen) + np.where(wrong > 0, _LOG_WRONG * (1 + wrong), 0.0)
+    odds = _log_odds(chosen) + np.where(wrong > 0, LOG_WRONG * (1 + wrong), 0.0)
     several = (wrong > 0) | bool(chosen)
     cost = likelihood.cost - gained + occam - in_range - odds - np.where(several, REFERENCE, 0.0)
     return _Evidence(tuple(c.key for c in chosen), subsets, likelihood.motion, sizes, std, covariance, cost)
@@ -339,7 +312,7 @@ def _log_odds(chosen: Sequence[Cause]) -> float:
     total = sum(c.prior.log_odds for c in chosen if not c.event)
     for event in dict.fromkeys(c.event for c in chosen if c.event):
         together = [c.prior.log_odds for c in chosen if c.event == event]
-        total += together[0] + _LOG_SAME_EVENT * (len(together) - 1)
+        total += together[0] + LOG_SAME_EVENT * (len(together) - 1)
     return total
 
 
@@ -367,15 +340,15 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
 
 __all__ = [
     "AS_PROBABLE",
-    "DERIVATIVES",
+    "LOG_SAME_EVENT",
+    "LOG_WRONG",
     "MOST_CAUSES",
     "REFERENCE",
     "WRONG_BY",
-    "Cause",
     "CauseSet",
-    "causes_of",
     "events",
     "explain",
     "least_cost",
+    "simplest",
     "simplest_first",
 ]

@@ -93,7 +93,7 @@ class Screened:
 
 @dataclass(frozen=True)
 class _Flown:
-    """What the records of a problem cover.
+    """Ranges that the records of a problem cover.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class _Flown:
 
     @classmethod
     def of(cls, problem: TraceProblem) -> _Flown:
-        """Of a problem."""
+        """Ranges of a problem."""
         records, motion = problem.records, problem.layout.motion
         names = (*factors_of(motion), motion.flow_rate, *(s.name for s in motion.known_signals))
         origins = np.array([r.plant.trim_signals for r in records]).T

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Shape
+from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.derivative_likelihood import contradiction
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.whitening import NO_WHITENER
@@ -30,7 +31,7 @@ from airtruth.tracing.selection.outcome import settled, total_cost
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.release import CONTRADICTED, DeclaredCauses, explained
+from airtruth.tracing.selection.release import CONTRADICTED, explained
 from airtruth.tracing.selection.rounds import NOTHING_DECLARED, Rival, SearchRound, scored_round
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import REMAINS
@@ -167,7 +168,7 @@ def _acts_on(effects: Sequence[Effect]) -> set[str]:
 
 @dataclass(frozen=True)
 class _Learning:
-    """What every increment of a trace shares.
+    """Common inputs of every increment of a trace.
 
     Attributes
     ----------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
@@ -11,6 +11,7 @@ import numpy as np
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.assess import likelihood_at
+from airtruth.tracing.inference.causes import Cause, DeclaredCauses
 from airtruth.tracing.inference.derivative_likelihood import (
     Contradiction,
     DerivativeLikelihood,
@@ -20,7 +21,6 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.selection.explanation import (
     WRONG_BY,
-    Cause,
     CauseSet,
     explain,
     least_cost,
@@ -36,37 +36,6 @@ _REFITS: Final = 4
 """Number of sets that are refitted in the filter [-] (judgement: each costs a refit)."""
 _HOPELESS: Final = 30.0
 """Log-posterior behind the best set from which a set is not refitted [-] (judgement: more than a curve explains)."""
-
-
-@dataclass(frozen=True)
-class DeclaredCauses:
-    """Candidates that explain a contradiction of the declared derivatives.
-
-    Attributes
-    ----------
-    causes : physical causes; wrong_allowed : whether declarations themselves may be wrong.
-    effects : effects of those causes that the filter carries, beyond first order.
-    corrections : causes of a set -> what its refit in the filter cost beyond first order [-].
-    """
-
-    causes: tuple[Cause, ...] = ()
-    wrong_allowed: bool = True
-    effects: tuple[Effect, ...] = ()
-    corrections: Mapping[tuple[str, ...], float] = field(default_factory=dict)
-
-    @property
-    def keys(self) -> Collection[str]:
-        """Keys of the physical causes."""
-        return {c.key for c in self.causes}
-
-    def beside(self, hypothesis: Hypothesis) -> DeclaredCauses:
-        """Those that are no effect of a hypothesis, which has them free already."""
-        taken = {e.key for e in hypothesis.effects}
-        return replace(
-            self,
-            causes=tuple(c for c in self.causes if c.key not in taken),
-            effects=tuple(e for e in self.effects if e.key not in taken),
-        )
 
 
 @dataclass(frozen=True)
@@ -235,7 +204,6 @@ def _explaining(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> t
 
 __all__ = [
     "CONTRADICTED",
-    "DeclaredCauses",
     "Release",
     "explained",
     "release",

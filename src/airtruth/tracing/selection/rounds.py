@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.derivative_likelihood import Contradiction, contradiction
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
@@ -35,7 +36,7 @@ from airtruth.tracing.selection.refit import (
     refit_leaders,
 )
 from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
+from airtruth.tracing.selection.release import Release, explained, release
 from airtruth.tracing.selection.score_test import Table
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import (

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
@@ -20,7 +21,7 @@ from airtruth.tracing.selection.explanation import events
 from airtruth.tracing.selection.outcome import CLEAN, STRONG_ODDS, Outcome, required_lead, settled, total_cost
 from airtruth.tracing.selection.refit import redundant_effect
 from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.release import DeclaredCauses, Release
+from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
@@ -84,7 +85,7 @@ def search(
 
 @dataclass(frozen=True)
 class _Search:
-    """What every round of a search shares."""
+    """Common inputs of every round of a search."""
 
     sets: SetTable
     seed: int

@@ -30,7 +30,7 @@ _ATTEMPTS: Final = 3
 
 
 class SetKey(NamedTuple):
-    """What a fit of a problem depends on, whatever its start: the effects in no order, and which derivatives are free.
+    """Key of a fit of a problem, whatever its start: the effects in no order, and the derivatives that are free.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is expected of the derivatives of ordinary aircraft, by the motion: sizes, meanings, and signs that physics requires.
+"""Expected derivatives of ordinary aircraft, by the motion: sizes, meanings, and signs that physics requires.
 
 Source of the signs: B. Etkin and L. D. Reid, *Dynamics of Flight*, 3rd ed., 1996, chapters 2, 3 and 5.
 """

@@ -1,0 +1,355 @@
+"""Evidence of every set of effects by one quadratic of the log-likelihood about a fit, for `best_first` alone.
+
+About a fit the negative log-likelihood is nearly quadratic in x, the increments of the derivatives and the sizes of all
+effects, with every other parameter eliminated under its prior:
+
+    f(x) = f_0 + g'x + x'H x / 2.
+
+A set of effects is a prior of x. Sizes of other effects are zero. The derivatives have the declared covariance, wider where a
+declaration is wrong. With the derivatives eliminated under this prior, the sizes s of a set have the log-evidence
+
+    log Z = -f(s_m)/c + log det(2 pi c H_s^-1) / 2 + log p(s_m) + log odds,
+
+where c is the long-run variance of the slopes of the likelihood over that of white innovations, and s_m the sizes of the largest
+likelihood. A size without a stated prior is log-uniform between the smallest size that matters and the end of its range, so
+that neither its unit nor its usual magnitude enters.
+
+Sources: D. J. C. MacKay, Neural Computation 4 (1992) 415-447 (evidence and its Occam factor); R. E. Kass and A. E. Raftery,
+J. Am. Statist. Assoc. 90 (1995) 773-795, section 4.1 (Laplace's method); F. Pauli, W. Racugno and L. Ventura, Statist. Sinica 21
+(2011) 149-164 (a likelihood divided by its ratio of variances).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr
+
+from airtruth.effects.effect import Effect, Prior
+from airtruth.tracing.inference.causes import DERIVATIVES, Cause
+from airtruth.tracing.selection.explanation import LOG_SAME_EVENT, LOG_WRONG, WRONG_BY
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SINGULAR: Final = 1e-6
+"""Least share of an information that remains beside the others of a set [-] (judgement: less is no other effect)."""
+_LEAST_SHAPE: Final = 0.1
+"""Uncertainty of the shape of a cause from which it widens the derivatives [-] (judgement: less is second order)."""
+_NEGLIGIBLE: Final = 15.0
+"""Log-evidence behind the best set of a size from which a set is left out [-] (judgement: a weight of 3e-7)."""
+_WRONG_BESIDE: Final = 4
+"""Number of sets of wrong declarations that are compared beside more than one effect [-] (judgement)."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """An effect of the filter, or a cause that changes the derivatives alone.
+
+    Attributes
+    ----------
+    effect, cause : one of them.
+    locations : parameters of the effect after its size; tried : number of locations that were compared.
+    freed : derivatives that the effect leaves without a declaration (`hypothesis.unconstrained_by`).
+    """
+
+    effect: Effect | None = None
+    cause: Cause | None = None
+    locations: tuple[float, ...] = ()
+    tried: int = 1
+    freed: tuple[int, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Key of the effect."""
+        return self.effect.key if self.effect is not None else self.of_cause.key
+
+    @property
+    def label(self) -> str:
+        """Name of the effect in sets."""
+        return self.effect.label if self.effect is not None else self.of_cause.key
+
+    @property
+    def of_cause(self) -> Cause:
+        """The cause.
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        if self.cause is None:
+            raise ValueError("the column is an effect of the filter")
+        return self.cause
+
+    @property
+    def prior(self) -> Prior | None:
+        """Normal prior of the size; None for one that is log-uniform."""
+        return self.effect.prior if self.effect is not None else self.of_cause.prior
+
+    @property
+    def log_odds(self) -> float:
+        """Logarithm of the prior odds, shared among the locations that were compared."""
+        prior = self.prior
+        return (Prior.log_odds if prior is None else prior.log_odds) - float(np.log(self.tried))
+
+    @property
+    def event(self) -> str:
+        """Event that moves it together with other effects; empty for an effect of its own."""
+        return self.effect.event if self.effect is not None else self.of_cause.event
+
+    @property
+    def widens(self) -> bool:
+        """Whether it widens the prior of the derivatives."""
+        return bool(self.freed) or (self.cause is not None and self.cause.prior.shape > _LEAST_SHAPE)
+
+    def may_join(self, other: Column) -> bool:
+        """Whether both may be in one set: not two variants of one effect, but delays of two channels."""
+        late = [("" if c.effect is None else c.effect.late_signal) for c in (self, other)]
+        apart = late[0] != late[1] and "" not in late
+        return self.key != other.key and (self.label != other.label or apart)
+
+
+class _SizePriors(NamedTuple):
+    """(columns,) constant of the log-density, 1 if it falls with the logarithm of the size, range, least size, and sign."""
+
+    constant: Array
+    falls: Array
+    low: Array
+    high: Array
+    least: Array
+    sign: Array
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """Which declarations of derivatives are wrong.
+
+    Attributes
+    ----------
+    wrong : numbers of these derivatives.
+    spread : (derivatives, derivatives) covariance of the increments beyond the declared one.
+    log_odds : logarithm of the prior odds.
+    """
+
+    wrong: tuple[int, ...]
+    spread: Array
+    log_odds: float
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A set of effects and its evidence.
+
+    Attributes
+    ----------
+    columns, sizes : indices of its effects in the quadratic, and their estimates without the prior of the sizes.
+    declaration : which declarations are wrong.
+    log_evidence : with the prior odds [-].
+    """
+
+    columns: tuple[int, ...]
+    sizes: Array
+    declaration: Declaration
+    log_evidence: float
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """A negative log-likelihood as a quadratic of derivatives, inertia and sizes.
+
+    Attributes
+    ----------
+    offset, slope, information : f_0, g (variables,) and H (variables, variables); the declared parameters come first.
+    declared : (declared, declared) prior covariance of these, the derivatives first.
+    derivatives : number of derivatives.
+    columns : the effects, in the order of the sizes.
+    temper : c of the module's formula [-].
+    """
+
+    offset: float
+    slope: Array
+    information: Array
+    declared: Array
+    derivatives: int
+    columns: tuple[Column, ...]
+    temper: float = 1.0
+
+    @property
+    def first(self) -> int:
+        """Index of the first size."""
+        return len(self.declared)
+
+    @cached_property
+    def _apart(self) -> NDArray[np.bool_]:
+        return np.array([[a.may_join(b) for b in self.columns] for a in self.columns], dtype=np.bool_)
+
+    @cached_property
+    def _log_odds(self) -> Array:
+        return np.array([c.log_odds for c in self.columns])
+
+    @cached_property
+    def _size_priors(self) -> _SizePriors:
+        return _SizePriors(*np.array([_size_prior(c) for c in self.columns]).reshape(-1, 6).T)
+
+    def given(self, spread: Array) -> tuple[float, Array, Array]:
+        """Log-evidence without any size, and slope and information of the sizes, the declared parameters eliminated.
+
+        Parameters
+        ----------
+        spread : covariance of the derivatives beyond the declared one.
+        """
+        k, g, h = self.first, self.slope / self.temper, self.information / self.temper
+        turned, gain = self._gain(spread)
+        across = h[k:, :k]
+        own = -self.offset / self.temper + 0.5 * float(g[:k] @ gain @ g[:k])
+        own -= 0.5 * float(np.linalg.slogdet(turned)[1])
+        return own, g[k:] - across @ gain @ g[:k], h[k:, k:] - across @ gain @ across.T
+
+    def most_probable(self, spread: Array, sizes: Array) -> Array:
+        """(declared,) the most probable declared parameters at given sizes of all columns."""
+        k = self.first
+        slope = (self.slope[:k] + self.information[:k, k:] @ sizes) / self.temper
+        return -self._gain(spread)[1] @ slope
+
+    def _gain(self, spread: Array) -> tuple[Array, Array]:
+        k, prior = self.first, self.declared.copy()
+        prior[: self.derivatives, : self.derivatives] += spread
+        turned = np.eye(k) + self.information[:k, :k] / self.temper @ prior
+        return turned, prior @ np.linalg.inv(turned)
+
+    def widening(self, column: int) -> Array:
+        """Covariance that a column adds to the derivatives: the uncertain shape of a cause, or the freedom of a curvature."""
+        c, spread = self.columns[column], np.zeros((self.derivatives, self.derivatives))
+        if c.cause is not None and c.widens:
+            prior = c.cause.prior
+            _, slope, information = self.given(spread)
+            size = -slope[column] / (information[column, column] + prior.std**-2)
+            spread += np.diag((size * prior.shape * c.cause.direction) ** 2)
+        for i in c.freed:
+            spread[i, i] += (max(WRONG_BY) ** 2 - 1.0) * self.declared[i, i]
+        return spread
+
+    def sets(self, most: int) -> list[Weighed]:
+        """Every set of up to ``most`` effects with its evidence, but for negligible ones; wrong declarations count as none."""
+        right, *wrong = self._declarations()
+        special = [i for i, c in enumerate(self.columns) if c.widens]
+        found: list[Weighed] = []
+        for number in range(min(most, 2) + 1):
+            for beside in itertools.combinations(special, number):
+                found += self._sets(right, beside, most - number)
+        alone = [(d, self._sets(d, (), min(most, 1))) for d in wrong]
+        alone.sort(key=lambda pair: -max(w.log_evidence for w in pair[1]))
+        for number, (declaration, own) in enumerate(alone):
+            found += own
+            if number < _WRONG_BESIDE and most > 1:
+                found += [w for w in self._sets(declaration, (), 2) if len(w.columns) > 1]
+                found += [w for i in special for w in self._sets(declaration, (i,), 1)]
+        return found
+
+    def names(self, weighed: Weighed) -> tuple[str, ...]:
+        """Names of a set, sorted; wrong declarations are one name."""
+        names = {self.columns[i].label for i in weighed.columns}
+        return tuple(sorted({*names, DERIVATIVES} if weighed.declaration.wrong else names))
+
+    def in_filter(self, weighed: Weighed) -> frozenset[str]:
+        """Keys of the effects of a set that the filter holds."""
+        return frozenset(self.columns[i].key for i in weighed.columns if self.columns[i].effect is not None)
+
+    def _declarations(self) -> Iterator[Declaration]:
+        """The declaration as it is, then every set of wrong ones, each by every factor of `WRONG_BY`."""
+        n = self.derivatives
+        yield Declaration((), np.zeros((n, n)), 0.0)
+        for count in range(1, n + 1):
+            odds = LOG_WRONG * (1 + count) - float(np.log(len(WRONG_BY)))
+            for wrong in itertools.combinations(range(n), count):
+                for by in WRONG_BY:
+                    spread = np.zeros((n, n))
+                    spread[wrong, wrong] = (by**2 - 1.0) * self.declared[wrong, wrong]
+                    yield Declaration(wrong, spread, odds)
+
+    def _sets(self, declaration: Declaration, beside: tuple[int, ...], most: int) -> list[Weighed]:
+        """Sets of columns that do not widen the derivatives, in addition to ``beside``."""
+        spread = declaration.spread + sum(map(self.widening, beside), np.zeros_like(declaration.spread))
+        own, slope, information = self.given(spread)
+        own += declaration.log_odds
+        found: list[Weighed] = []
+        if not beside:
+            found.append(Weighed((), np.zeros(0), declaration, own))
+        pool = [i for i, c in enumerate(self.columns) if not c.widens]
+        for number in range(0 if beside else 1, most + 1):
+            rows = [(*beside, *c) for c in itertools.combinations(pool, number)]
+            if not rows:
+                break
+            chosen = np.array(rows, dtype=np.int64).reshape(len(rows), len(beside) + number)
+            for a, b in itertools.combinations(range(chosen.shape[1]), 2):
+                chosen = chosen[self._apart[chosen[:, a], chosen[:, b]]]
+            sizes, logs = self._laplace(slope, information, chosen)
+            total = own + logs + self._odds(chosen)
+            for i in np.flatnonzero(total > total.max(initial=-np.inf) - _NEGLIGIBLE):
+                columns = tuple(chosen[i].tolist())
+                found.append(Weighed(columns, sizes[i], declaration, float(total[i])))
+        return found
+
+    def _odds(self, chosen: Ints) -> Array:
+        """(sets,) log prior odds; further causes of one event have those of an event that has happened."""
+        total = self._log_odds[chosen].sum(axis=1)
+        of_event = np.array([c.event != "" for c in self.columns])
+        for row in np.flatnonzero(of_event[chosen].sum(axis=1) > 1):
+            together = self._log_odds[[i for i in chosen[row] if of_event[i]]]
+            total[row] += together.max() - together.sum() + LOG_SAME_EVENT * (len(together) - 1)
+        return np.asarray(total)
+
+    def _laplace(self, slope: Array, information: Array, chosen: Ints) -> tuple[Array, Array]:
+        """(sets, number) sizes and (sets,) log-evidence of these; NaN and minus infinity where they are nearly dependent."""
+        number = chosen.shape[1]
+        own = information[chosen[:, :, None], chosen[:, None, :]].copy()
+        sizes, logs = np.full(chosen.shape, np.nan), np.full(len(chosen), -np.inf)
+        variance = np.diagonal(own, axis1=1, axis2=2)
+        scale = np.sqrt(np.where(variance > 0.0, variance, np.inf))
+        sound = np.linalg.det(own / (scale[:, :, None] * scale[:, None, :])) > SINGULAR
+        if not sound.any():
+            return sizes, logs
+        normal = np.array([0.0 if c.prior is None else c.prior.std**-2.0 for c in self.columns])
+        own[:, range(number), range(number)] += normal[chosen]
+        inverse = np.linalg.inv(own[sound])
+        x = -np.einsum("nij,nj->ni", inverse, slope[chosen[sound]])
+        std = np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
+        gain = -0.5 * (slope[chosen[sound]] * x).sum(axis=1)
+        occam = 0.5 * np.linalg.slogdet(inverse)[1] + 0.5 * number * np.log(2.0 * np.pi)
+        sizes[sound] = x
+        logs[sound] = gain + occam + self._log_prior(x, std, chosen[sound])
+        return sizes, logs
+
+    def _log_prior(self, x: Array, std: Array, chosen: Ints) -> Array:
+        """(sets,) log-density of the sizes, with the share of their probability that lies within the range."""
+        constant, falls, low, high, least, sign = (values[chosen] for values in self._size_priors)
+        density = constant - falls * np.log(np.maximum(np.abs(x), np.where(falls > 0.0, least, 1.0)))
+        beyond = np.where(sign == 0.0, np.abs(x), sign * x) - least
+        inside = np.where(falls > 0.0, log_ndtr(beyond / std), 0.0)
+        inside += log_ndtr((high - x) / std) + log_ndtr((x - low) / std)
+        return np.asarray((density + inside).sum(axis=1))
+
+
+def _size_prior(c: Column) -> tuple[float, float, float, float, float, float]:
+    """Prior of the size of a column; see `_SizePriors`. What is one-sided has no lower end but the least size."""
+    prior = c.prior
+    if c.effect is None or prior is not None:
+        given = c.of_cause.prior if prior is None else prior
+        return (-0.5 * float(np.log(2.0 * np.pi * given.std**2)), 0.0, given.low, given.high, 0.0, 0.0)
+    first = c.effect.parameters[0]
+    low, high = first.reach
+    sign = 1.0 if low >= 0.0 else float(first.sign)
+    end = max(abs(low), abs(high))
+    least = min(first.material, 0.5 * end)
+    sides = 1.0 if sign else 2.0
+    return (-float(np.log(sides * np.log(end / least))), 1.0, -end if low >= 0.0 else low, high, least, sign)
+
+
+__all__ = ["SINGULAR", "Column", "Declaration", "Quadratic", "Weighed"]
