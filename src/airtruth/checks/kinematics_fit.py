@@ -187,7 +187,7 @@ def problem_of(
     at = {**known, **(errors or {})}
     differences = [kinematics.compare(r, at, equations) for r in records]
     slopes = [_offset_slopes(r, d, at, kinematics) for r, d in zip(records, differences, strict=True)]
-    weight = weigh(records, lines, differences, slopes, kinematics, enlarged)
+    weight = weigh(records, lines, differences, slopes, equations, kinematics, enlarged)
     return Problem(tuple(records), lines, tuple(equations), known, limits, weight, kinematics, enlarged)
 
 

@@ -19,7 +19,6 @@ from airtruth.checks.kinematics_search import DOUBT, Search, completed, search
 from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding
-from airtruth.checks.rotation import alpha_coupling
 from airtruth.checks.samples import integral
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
@@ -195,24 +194,6 @@ def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]
     return records[:MOST_RECORDS], remarks
 
 
-_OF_ALPHA: Final = {"alpha_rad", "theta_rad", "q_rad_s", "ax_m_s2", "az_m_s2", "beta_rad"}
-"""Channels from which alpha follows without the air."""
-
-
-def _inertial(alpha: Array, bank: Array, c: Mapping[str, Array], dt_s: float) -> Array:
-    """(samples,) alpha of the velocity over ground [rad]: the integral of its rate, with the constant and the ramp of the vane.
-
-    A gust at the vane would turn roll into sideslip, which the surfaces then seem to cause.
-    """
-    cos_a, sin_a = np.cos(alpha), np.sin(alpha)
-    lift = c["az_m_s2"] * cos_a - c["ax_m_s2"] * sin_a
-    weight = G0 * (cos_a * np.cos(c["theta_rad"]) * np.cos(bank) + sin_a * np.sin(c["theta_rad"]))
-    turn = c["q_rad_s"] + alpha_coupling(c["p_rad_s"], c["r_rad_s"], alpha, c["beta_rad"])
-    moved = integral(turn + (lift + weight) / (c["airspeed_m_s"] * np.cos(c["beta_rad"])), dt_s)
-    base = np.linspace(-1.0, 1.0, len(alpha))
-    return np.asarray(moved + np.polyval(np.polyfit(base, alpha - moved, 1), base))
-
-
 def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord:
     def given(name: str) -> Array:
         return c[name] if name in c else np.zeros_like(c["p_rad_s"])
@@ -220,9 +201,6 @@ def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord:
     alpha = given("alpha_rad")
     path = given("ax_m_s2") * np.cos(alpha) + given("az_m_s2") * np.sin(alpha)
     phi, psi = (np.unwrap(c[n]) if n in c else None for n in ("phi_rad", "psi_rad"))
-    bank = integral(c["p_rad_s"], dt_s) if phi is None else phi
-    if c.keys() >= _OF_ALPHA:
-        alpha = _inertial(alpha, bank, c, dt_s)
     return SideRecord(
         run_id=run_id,
         dt_s=dt_s,
@@ -235,7 +213,7 @@ def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord:
         alpha=alpha,
         theta=given("theta_rad") if "theta_rad" in c else alpha,
         q=given("q_rad_s"),
-        bank=bank,
+        bank=integral(c["p_rad_s"], dt_s) if phi is None else phi,
         path=path if "ax_m_s2" in c and "az_m_s2" in c else np.zeros_like(path),
         phi=phi,
         psi=psi,

@@ -180,6 +180,7 @@ def weigh(
     lines: Sequence[Lines],
     differences: Sequence[Mapping[str, Array]],
     slopes: Sequence[Mapping[str, Array]],
+    equations: Sequence[str],
     kinematics: Kinematics = LONGITUDINAL,
     enlarged: Mapping[str, float] | None = None,
 ) -> Weight:
@@ -190,6 +191,7 @@ def weigh(
     records, lines : of each record.
     differences : of each record, equation -> (samples,) difference at the errors where the noise is judged.
     slopes : of each record, equation -> (offsets, samples) derivatives of the difference by the offsets of the record.
+    equations : equations that are used.
     kinematics : of the motion.
     enlarged : equation -> factor on the noise for motion that no error explains; 1 without an entry.
     """
@@ -197,7 +199,6 @@ def weigh(
     freed = []
     for line, slope in zip(lines, slopes, strict=True):
         freed.append({e: np.vstack([line.trends, line.of(x)]) for e, x in slope.items()})
-    equations = tuple(differences[0])
     for equation in equations:
         alike: dict[object, list[int]] = {}
         for i, record in enumerate(records):
