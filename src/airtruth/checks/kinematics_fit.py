@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -186,38 +186,28 @@ def problem_of(
     lines = tuple(lines or (lines_of(r, kinematics) for r in records))
     at = {**known, **(errors or {})}
     differences = [kinematics.compare(r, at, equations) for r in records]
-    weight = weigh(records, lines, differences, equations, kinematics, enlarged)
-    made = KinematicProblem(
+    slopes = [_offset_slopes(r, d, at, kinematics) for r, d in zip(records, differences, strict=True)]
+    weight = weigh(records, lines, differences, slopes, equations, kinematics, enlarged)
+    return KinematicProblem(
         tuple(records), lines, tuple(equations), known, limits, weight, kinematics, enlarged
     )
-    base = made.white(errors or {})
-    for name, step in kinematics.offsets.items():
-        moved = made.white({**(errors or {}), name: step}) - base
-        made = replace(made, weight=_freed(made.weight, moved))
-    return made
 
 
-def _freed(weight: Weight, moved: Array) -> Weight:
-    """Weight whose motions leave the direction ``moved`` (rows,) of an unknown constant free: their moments along it vanish."""
-    own, start = [], 0
-    for record in weight.own:
-        parts = []
-        for columns in record:
-            stop = start + columns.shape[0]
-            parts.append(_blind(columns, moved[start:stop]))
-            start = stop
-        own.append(tuple(parts))
-    return replace(weight, span=_blind(weight.span, moved), own=tuple(own))
-
-
-def _blind(columns: Array, moved: Array) -> Array:
-    """Orthonormal columns (n, k - 1) of the part of the span whose moments with a signal (n,) vanish."""
-    along = columns.T @ moved
-    size = float(np.linalg.norm(along))
-    if size <= 1e-12:
-        return columns
-    _, _, right = np.linalg.svd(along[None] / size)
-    return np.asarray(columns @ right[1:].T)
+def _offset_slopes(
+    record: Samples, difference: Mapping[str, Array], at: Mapping[str, float], kinematics: Kinematics
+) -> dict[str, Array]:
+    """Equation -> (offsets, samples) derivatives of its difference by the offsets of the kinematics."""
+    moved = [
+        kinematics.compare(record, {**at, name: at.get(name, 0.0) + step}, tuple(difference))
+        for name, step in kinematics.offsets.items()
+    ]
+    steps = kinematics.offsets.values()
+    return {
+        equation: np.array([(m[equation] - d) / step for m, step in zip(moved, steps, strict=True)]).reshape(
+            -1, record.length
+        )
+        for equation, d in difference.items()
+    }
 
 
 def fit(

@@ -74,7 +74,7 @@ class Weight:
     std : for each record, equation -> (lines,) standard deviation of the noise.
     span : (rows, m) orthonormal columns over the lines of all records and equations: the pooled instruments.
     own : for each record and equation, (lines, k) orthonormal columns.
-    trends : for each record and equation, (trends, lines) the whitened trends, orthonormal.
+    trends : for each record and equation, (trends + offsets, lines) the whitened trends and effects of the offsets, orthonormal.
     degrees : degrees of freedom of the noise of one equation near the motion [-].
     """
 
@@ -96,39 +96,90 @@ def lines_of(record: Samples, kinematics: Kinematics = LONGITUDINAL) -> Lines:
     return Lines(keep, hz[keep], np.asarray(rows), np.array(trends))
 
 
-def noise_spectrum(y: Array, hz: Array, outside: Array, floor: float) -> Array:
-    """(lines,) standard deviation of the noise of lines.
+@dataclass(frozen=True)
+class Part:
+    """Lines of a difference that are evidence of a noise.
+
+    Attributes
+    ----------
+    y, hz : (lines,) lines and their frequencies [Hz].
+    outside : (k, lines) rows whose span is no evidence of noise.
+    floor : smallest standard deviation of a line.
+    """
+
+    y: Array
+    hz: Array
+    outside: Array
+    floor: float
+
+    def rest(self, variance: Array) -> tuple[Array, Array]:
+        """(lines,) squares of the lines less the span of ``outside``, and the share of each line that is free of it."""
+        std = np.sqrt(variance)
+        span = np.linalg.qr((self.outside / std).T)[0]
+        white = self.y / std
+        rest = ((white - span @ (span.T @ white)) * std) ** 2
+        return rest, 1.0 - np.minimum(np.einsum("nk,nk->n", span, span), 1.0)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One noise of several parts.
+
+    Attributes
+    ----------
+    std : of each part, (lines,) standard deviation of its lines.
+    deviance : -2 log of the restricted likelihood, but for a constant.
+    sizes : number of its sizes.
+    """
+
+    std: tuple[Array, ...]
+    deviance: float
+    sizes: int
+
+
+def noise_spectrum(parts: Sequence[Part]) -> Noise:
+    """The noise that all parts have.
 
     A sum of white noise, integrated noise (which is also the upper part of a gust's spectrum) and differentiated
     noise, none of them negative, by the multiplicative steps of the restricted likelihood. More shapes make the
     lowest lines, where the elevator's motions leave little evidence of noise, too uncertain for a test.
-
-    Parameters
-    ----------
-    y : (lines,) lines of a difference.
-    hz : (lines,) frequencies [Hz].
-    outside : (k, lines) rows whose span is no evidence of noise.
-    floor : smallest standard deviation of a line.
     """
-    floor = max(floor, 1e-150)
-    shape = np.array([np.ones_like(hz), (hz[0] / hz) ** 2, (hz / hz[-1]) ** 2])
-    size = np.full(len(shape), max(float(np.mean(y**2)), floor**2) / len(shape))
+    hz, y = (np.concatenate([getattr(part, n) for part in parts]) for n in ("hz", "y"))
+    floor = np.concatenate([np.full(len(part.hz), max(part.floor, 1e-150) ** 2) for part in parts])
+    ends = np.cumsum([len(part.hz) for part in parts])[:-1]
+    shape = np.array([np.ones_like(hz), (hz.min() / hz) ** 2, (hz / hz.max()) ** 2])
+    size = np.full(len(shape), max(float(np.mean(y**2)), float(floor.max())) / len(shape))
     for step in range(WHITTLE_STEPS):
-        variance = size @ shape + floor**2
+        variance = size @ shape + floor
         if step % 10 == 0:
-            std = np.sqrt(variance)
-            span = np.linalg.qr((outside / std).T)[0]
-            white = y / std
-            rest = ((white - span @ (span.T @ white)) * std) ** 2
-            free = 1.0 - np.minimum(np.einsum("nk,nk->n", span, span), 1.0)
+            own = zip(parts, np.split(variance, ends), strict=True)
+            rest, free = (np.concatenate(x) for x in zip(*(part.rest(v) for part, v in own), strict=True))
         size = size * np.sqrt((shape @ (rest / variance**2)) / (shape @ (free / variance)))
-    return np.asarray(np.sqrt(size @ shape + floor**2))
+    variance = size @ shape + floor
+    deviance = float(np.sum(free * np.log(variance) + rest / variance))
+    return Noise(tuple(np.split(np.sqrt(variance), ends)), deviance, len(size))
+
+
+def _noise_of(parts: Sequence[Part]) -> list[Array]:
+    """(lines,) standard deviation of the lines of each part, of a noise of its own or of one that all share.
+
+    The motion of a record leaves little evidence of noise in its lowest lines. The noise is common unless that of each part has a
+    deviance less by more than two for each further size (H. Akaike, *IEEE Trans. Automatic Control* 19, 1974).
+    """
+    own = [noise_spectrum([part]) for part in parts]
+    if len(own) > 1:
+        shared = noise_spectrum(parts)
+        further = sum(noise.sizes for noise in own) - shared.sizes
+        if shared.deviance - sum(noise.deviance for noise in own) < 2.0 * further:
+            return list(shared.std)
+    return [noise.std[0] for noise in own]
 
 
 def weigh(
     records: Sequence[Samples],
     lines: Sequence[Lines],
     differences: Sequence[Mapping[str, Array]],
+    slopes: Sequence[Mapping[str, Array]],
     equations: Sequence[str],
     kinematics: Kinematics = LONGITUDINAL,
     enlarged: Mapping[str, float] | None = None,
@@ -139,38 +190,56 @@ def weigh(
     ----------
     records, lines : of each record.
     differences : of each record, equation -> (samples,) difference at the errors where the noise is judged.
+    slopes : of each record, equation -> (offsets, samples) derivatives of the difference by the offsets of the record.
     equations : equations that are used.
     kinematics : of the motion.
     enlarged : equation -> factor on the noise for motion that no error explains; 1 without an entry.
     """
-    stds, own, trends, blocks = [], [], [], []
+    stds: list[dict[str, Array]] = [{} for _ in records]
+    freed = []
+    for line, slope in zip(lines, slopes, strict=True):
+        freed.append({e: np.vstack([line.trends, line.of(x)]) for e, x in slope.items()})
+    for equation in equations:
+        alike: dict[object, list[int]] = {}
+        for i, record in enumerate(records):
+            alike.setdefault(record.dt_s if kinematics.common else i, []).append(i)
+        for numbers in alike.values():
+            parts = [
+                Part(
+                    lines[i].of(differences[i][equation]),
+                    lines[i].hz,
+                    np.vstack([lines[i].basis, _moving(freed[i][equation])]),
+                    _floor(records[i], lines[i], kinematics, equation),
+                )
+                for i in numbers
+            ]
+            for i, s in zip(numbers, _noise_of(parts), strict=True):
+                stds[i][equation] = (enlarged or {}).get(equation, 1.0) * s
+    own, trends, blocks = [], [], []
     count = lines[0].basis.shape[0]
-    for record, line, difference in zip(records, lines, differences, strict=True):
-        std, mine, rising = {}, [], []
-        block = []
-        for place, equation in enumerate(equations):
-            y = line.of(difference[equation])
-            outside = np.vstack([line.basis, line.trends])
-            s = noise_spectrum(y, line.hz, outside, _floor(record, line, kinematics, equation))
-            if enlarged and equation in enlarged:
-                s = enlarged[equation] * s
-            std[equation] = s
-            steps = _orthonormal_rows(line.trends / s)
+    for line, std, free in zip(lines, stds, freed, strict=True):
+        mine, rising, block = [], [], []
+        for place, (equation, s) in enumerate(std.items()):
+            steps = _orthonormal_rows(free[equation] / s)
             white = line.basis / s
             for step in steps:
                 white = white - np.outer(white @ step, step)
             mine.append(_orthonormal(white))
             rising.append(steps)
-            part = np.zeros((len(s), count * len(equations)))
+            part = np.zeros((len(s), count * len(std)))
             part[:, place * count : (place + 1) * count] = _padded(white, count).T
             block.append(part)
-        stds.append(std)
         own.append(tuple(mine))
         trends.append(tuple(rising))
         blocks.append(np.concatenate(block))
     span = _orthonormal(np.concatenate(blocks).T)
     degrees = sum(len(line.keep) - count - len(line.trends) for line in lines) / LINES_PER_DEGREE
     return Weight(tuple(stds), span, tuple(own), tuple(trends), max(degrees, 3.0))
+
+
+def _moving(rows: Array) -> Array:
+    """Rows that are not zero."""
+    return np.asarray(rows[np.abs(rows).max(axis=1) > 0.0])
 
 
 def without(rows: Array, directions: Array) -> Array:
@@ -183,11 +252,12 @@ def without(rows: Array, directions: Array) -> Array:
 
 
 def _orthonormal_rows(rows: Array) -> Array:
-    """(k, n) rows orthonormal in their order (Gram and Schmidt)."""
+    """(k, n) rows orthonormal in their order (Gram and Schmidt); a row of zeros stays."""
     result: list[Array] = []
     for row in rows:
         rest = without(row, np.array(result)) if result else row
-        result.append(rest / np.linalg.norm(rest))
+        size = np.linalg.norm(rest)
+        result.append(rest / size if size > 0.0 else rest)
     return np.array(result)
 
 

@@ -153,7 +153,8 @@ class Kinematics:
     most : largest number of errors in a set; a real record, which no kinematic model of few terms explains exactly, takes up any
         further error.
     trends : degree of the polynomial that is free in each equation and record.
-    offsets : unknown constants, free in every set: name -> step of its derivative [SI].
+    offsets : unknown errors that are free in each record and every set: name -> step of its derivative [SI].
+    common : the records may share one noise, where they do not differ by it.
     """
 
     errors: Mapping[str, InstrumentError]
@@ -167,6 +168,7 @@ class Kinematics:
     most: int = 3
     trends: int = 1
     offsets: Mapping[str, float] = field(default_factory=dict)
+    common: bool = False
 
 
 def declared_errors(aircraft: Aircraft, kinematics: Kinematics) -> dict[str, float]:

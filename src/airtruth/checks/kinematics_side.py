@@ -3,7 +3,7 @@
 No aerodynamic model enters. The equations are those of `airtruth.checks.rotation`, integrated, so that no measured channel is
 differentiated. The errors of the instruments: a vane x ahead of the centre of gravity reads beta + x r/V, an accelerometer
 at x, z reads ay + x r_dot - z p_dot. The integral of x r_dot/V is x r/V: the kinematics shows the place of the vane relative
-to the accelerometer. A constant error of alpha turns roll into sideslip; it is free in every set of errors.
+to the accelerometer. An error of alpha turns roll into sideslip; its constant and its ramp are free in each record.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ EQUATIONS: Final = ("phi", "psi", "beta")
 """Equations that are integrated, by the channel that they predict."""
 ALPHA_BIAS: Final = "vane_bias"
 """Name of the constant of alpha, which is free."""
+ALPHA_DRIFT: Final = "vane_drift"
+"""Name of the ramp of alpha, which is free."""
 _SLOW: Final = (1.0, 3.0)
 """Time constants of the low-passes of the simulated motion, over the period of the motion per radian [-]."""
 
@@ -113,7 +115,7 @@ def compare(
     Parameters
     ----------
     record : channels.
-    errors : instrument errors, names of `ERRORS`, and `ALPHA_BIAS` [rad]; an error without an entry is absent.
+    errors : instrument errors, names of `ERRORS`, `ALPHA_BIAS` [rad] and `ALPHA_DRIFT` [rad/s]; one without an entry is absent.
     equations : equations to evaluate; those whose channels the record lacks are left out.
     """
     dt = record.dt_s
@@ -138,7 +140,8 @@ def compare(
         yawed = integral(heading_rate(record.q, r, bank, record.theta), dt)
         result["psi"] = record.psi - earlier(yawed, dt, -error("psi_rad", "delay"))
     if "beta" in equations and record.beta is not None:
-        alpha = record.alpha - float(errors.get(ALPHA_BIAS, 0.0))
+        ramp = record.t - record.t.mean()
+        alpha = record.alpha - float(errors.get(ALPHA_BIAS, 0.0)) - float(errors.get(ALPHA_DRIFT, 0.0)) * ramp
         ay = earlier(record.ay, dt, error("ay_m_s2", "delay")) / error("ay_m_s2", "scale")
         x, z = error("ay_m_s2", "arm"), error("ay_m_s2", "arm_down")
         ay = ay - record.q * (x * p + z * r)
@@ -198,7 +201,8 @@ LATERAL: Final = Kinematics(
     telling={"vane_scale:beta_rad": 0.15, "vane_lag:beta_rad": 0.1},
     most=4,
     trends=2,
-    offsets={ALPHA_BIAS: 1e-3},
+    offsets={ALPHA_BIAS: 1e-3, ALPHA_DRIFT: 1e-4},
+    common=True,
 )
 """The kinematics of the lateral-directional motion (`telling`: judgement, as in the longitudinal motion)."""
 
