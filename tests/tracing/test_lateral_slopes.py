@@ -56,10 +56,9 @@ def bent():
     made = lr.plant()
     line = np.linspace(-1.0, 1.0, 51)
     axis = np.linspace(-1.0, 1.0, 3)
-    slope = made.values[:, :1, 1:, :]
-    values = slope * (line + 2.0 * line**3)[:, None] * (1.0 + 0.5 * axis)[:, None, None]
-    tables = {"points": np.tile(line, (5, 1)), "values": values, "constant": np.zeros((axis.size, 3))}
-    return replace(made, alpha_rad=axis, **tables)
+    bend = (line + 2.0 * line**3)[:, None] * (1.0 + 0.5 * axis)[:, None, None]
+    tables = tuple(replace(t, axes=(axis, line), values=t.values[:1, 1:] * bend) for t in made.tables)
+    return replace(made, tables=tables, constant=np.zeros((axis.size, 3)))
 
 
 def arguments(change, share, uncertain, speed=lr.V):

@@ -366,13 +366,15 @@ def test_a_lost_motion_leaves_no_sample_undefined():
 def over_break(slope):
     """A plant whose lift has another slope beyond 0.5 deg; moment and pitch rate as in the linear one."""
     base = tr.plant()
+    (table,) = base.tables
     axis = np.array([-1.0, 0.5 * DEG, 1.0])
-    values = np.repeat(base.values[:1], 3, axis=0)
+    values = np.repeat(table.values[:1], 3, axis=0)
     for i, alpha in enumerate(axis):
         share = 0.5 * (alpha + 1.0)
-        values[i] = (1.0 - share) * base.values[0] + share * base.values[1]
+        values[i] = (1.0 - share) * table.values[0] + share * table.values[1]
     values[2, ..., 1] -= (slope - tr.TRUTH[0]) * (1.0 - 0.5 * DEG) * tr.C.wing_area_m2
-    return replace(base, alpha_rad=axis, values=values, constant=np.zeros((3, 3)))
+    bent = replace(table, axes=(axis, *table.axes[1:]), values=values)
+    return replace(base, tables=(bent,), constant=np.zeros((3, 3)))
 
 
 def whitened_az(slope, vane_std_rad, change=None, shown=1.0):

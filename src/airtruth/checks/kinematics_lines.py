@@ -97,7 +97,7 @@ def lines_of(record: Samples, kinematics: Kinematics = LONGITUDINAL) -> Lines:
 
 
 @dataclass(frozen=True)
-class Part:
+class NoiseLines:
     """Lines of a difference that are evidence of a noise.
 
     Attributes
@@ -137,7 +137,7 @@ class Noise:
     sizes: int
 
 
-def noise_spectrum(parts: Sequence[Part]) -> Noise:
+def noise_spectrum(parts: Sequence[NoiseLines]) -> Noise:
     """The noise that all parts have.
 
     A sum of white noise, integrated noise (which is also the upper part of a gust's spectrum) and differentiated
@@ -160,7 +160,7 @@ def noise_spectrum(parts: Sequence[Part]) -> Noise:
     return Noise(tuple(np.split(np.sqrt(variance), ends)), deviance, len(size))
 
 
-def _noise_of(parts: Sequence[Part]) -> list[Array]:
+def _noise_of(parts: Sequence[NoiseLines]) -> list[Array]:
     """(lines,) standard deviation of the lines of each part, of a noise of its own or of one that all share.
 
     The motion of a record leaves little evidence of noise in its lowest lines. The noise is common unless that of each part has a
@@ -205,7 +205,7 @@ def weigh(
             alike.setdefault(record.dt_s if kinematics.common else i, []).append(i)
         for numbers in alike.values():
             parts = [
-                Part(
+                NoiseLines(
                     lines[i].of(differences[i][equation]),
                     lines[i].hz,
                     np.vstack([lines[i].basis, _moving(freed[i][equation])]),
