@@ -127,7 +127,7 @@ def _fitted(case: Case, hypothesis: Hypothesis, true: Array, trial: dict[str, An
         noise=trial["noise"],
         effects=tuple(e["key"] for e in trial["effects"]),
         p_value=found.anomaly.p_value,
-        where=found.anomaly.where,
+        where=found.anomaly.null,
         z=z,
         scores=tuple(scores[:3]),
     )

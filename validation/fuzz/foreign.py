@@ -319,14 +319,14 @@ def words_case(rng: Random, folder: Path) -> None:
     """A damaged file of knowledge of a source, and a guess with it."""
     path, table = folder / "words.toml", folder / "f.csv"
     text = rng.choice(sorted(_KNOWN.glob("*.toml"))).read_bytes()
-    path.write_bytes(damaged(rng, text) if rng.random() < 0.5 else _cells(rng, text))
+    path.write_bytes(damaged(rng, text) if rng.random() < 0.5 else _cells(rng, text, "utf-8"))
     table.write_bytes(csv()[0][0])
     tomllib.loads(guess_mapping(table, words=read_dictionary(path)))
 
 
-def _cells(rng: Random, content: bytes) -> bytes:
+def _cells(rng: Random, content: bytes, encoding: str = "cp1252") -> bytes:
     """A table of text with cells and lines replaced."""
-    lines = content.decode("cp1252").splitlines()
+    lines = content.decode(encoding).splitlines()
     for _ in range(rng.choice((1, 2, 5))):
         at = rng.randrange(len(lines))
         cells = lines[at].split(sep := rng.choice((",", ";", " ", "|")))
