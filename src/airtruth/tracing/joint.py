@@ -17,19 +17,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from scipy.stats import chi2
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.answer import DECLARED_LEVEL
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.searched import Searched
 from airtruth.tracing.selection.significance import significant_gain
-
-DISAGREE: Final = 0.005
-"""Probability of two sizes as far apart from which the records of one motion refuse that of the other [-] (judgement: that of
-`airtruth.tracing.answer.DECLARED_LEVEL`)."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ class SharedCause:
     effect : of the library, with the size of the first motion in its coordinate.
     alone : name of the motion -> what its records tell.
     statistic, p_value : chi-square of one degree, and probability of sizes as far apart [-].
-    refused : whether the two sizes contradict each other, so that the motions have no common one.
+    refused : whether the two sizes contradict each other, at the level of the declared model: the motions have no common one.
     """
 
     effect: Effect
@@ -137,7 +133,7 @@ def _with_one_size(
         alone=dict(zip(names, (first, second), strict=True)),
         statistic=statistic,
         p_value=p_value,
-        refused=p_value < DISAGREE,
+        refused=p_value < DECLARED_LEVEL,
     )
     if not any(_names(s, key) for s in own):
         least = significant_gain(max(len(s.case.effects) for s in own))
@@ -211,4 +207,4 @@ def sentences(causes: Sequence[SharedCause]) -> Iterator[str]:
             )
 
 
-__all__ = ["DISAGREE", "SharedCause", "Told", "combined", "jointly", "sentences", "told_by"]
+__all__ = ["SharedCause", "Told", "combined", "jointly", "sentences", "told_by"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,12 +88,11 @@ def register_packing(motion: Motion, packing: Packing) -> None:
 
 
 @dataclass(frozen=True)
-class FilterInputs:
-    """Input of the filter from a record and a change, independent of the parameters.
+class _Inputs:
+    """Input of the filter, with neither the record nor the change: what is kept of a record may not refer to it.
 
     Attributes
     ----------
-    record, compiled : the record and the change.
     y : (lead + samples, 3) outputs, those before a part of a run first.
     lead : number of samples before the part.
     grid : inputs on the filter's grid, the errors of their sensors undone.
@@ -101,8 +100,6 @@ class FilterInputs:
     reference_flow_rad, reference : means of the record; along : flight conditions at which the gain is made.
     """
 
-    record: TraceRecord
-    compiled: CompiledChange
     y: Array
     lead: int
     grid: AnyGrid
@@ -110,27 +107,28 @@ class FilterInputs:
     reference_flow_rad: float
     reference: AnyPoint
     along: Schedule
+
+
+@dataclass(frozen=True)
+class FilterInputs(_Inputs):
+    """Input of the filter from a record and a change, independent of the parameters; further attributes as of its base.
+
+    Attributes
+    ----------
+    record, compiled : the record and the change.
+    """
+
+    record: TraceRecord
+    compiled: CompiledChange
 
 
 def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> FilterInputs:
     """Undo what a change says of the inputs' sensors, and put what it says of the surface behind the elevator."""
     compiled = change if isinstance(change, CompiledChange) else compile_change(change, record.signals.motion)
     if any(compiled.surface) or compiled.inputs:
-        return FilterInputs(record, compiled, *_inputs(record, compiled))
+        return FilterInputs(**vars(_inputs(record, compiled)), record=record, compiled=compiled)
     made = _AS_MEASURED.of(record) or _AS_MEASURED.keep(record, _inputs(record, compiled))
-    return FilterInputs(record, compiled, *made)
-
-
-class _Inputs(NamedTuple):
-    """`FilterInputs` without the record and the change."""
-
-    y: Array
-    lead: int
-    grid: AnyGrid
-    corner_rad2: Array
-    reference_flow_rad: float
-    reference: AnyPoint
-    along: Schedule
+    return FilterInputs(**vars(made), record=record, compiled=compiled)
 
 
 _AS_MEASURED: Final = Kept[_Inputs]()
