@@ -269,7 +269,10 @@ def _p_value(own: SearchRound, best: Candidate) -> float:
     """
     if isinstance(best.score.effect, Increment):
         return best.score.p_value
-    index = [s.effect.key for s in own.table.scores].index(best.score.effect.key)
+    keys = [s.effect.key for s in own.table.scores]
+    if best.score.effect.key not in keys:
+        return len(own.adjusted) * float(chi2.sf(max(best.gain, 0.0), 1))
+    index = keys.index(best.score.effect.key)
     ratio = len(own.adjusted) * float(chi2.sf(max(best.gain, 0.0), 1))
     return min(float(own.adjusted[index]), ratio)
 

@@ -20,6 +20,7 @@ from airtruth.tracing.selection.budget import Advance, Budget, may_begin
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
 from airtruth.tracing.selection.outcome import total_cost
+from airtruth.tracing.selection.posterior_rounds import posterior_search
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.rounds import (
     NOTHING_KNOWN,
@@ -112,7 +113,8 @@ class Searched:
         if options.learns:
             declared = self.case.declared
             rounds = with_increments(self.sets, rounds, effects, options.seed, self.advance, declared)
-        rounds = with_look_alikes(self.sets, rounds, effects, self.advance)
+        if not rounds[-1].posterior:
+            rounds = with_look_alikes(self.sets, rounds, effects, self.advance)
         case = self.case
         if isinstance(self.advance, Budget):
             case = replace(case, left_out=self.advance.left_out)
@@ -158,6 +160,8 @@ def _rounds(
     """
     case, options = own.case, own.options
     at = begin or RoundStart(case.hypothesis, own.start, case.effects)
+    if case.fitted.layout.motion.name == "longitudinal":
+        return posterior_search(own.sets, at, options.seed, own.advance, case.declared)
     known = starts_of(own.kinematics) if begin is None else NOTHING_KNOWN
     rounds = search(
         own.sets,

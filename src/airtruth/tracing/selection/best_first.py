@@ -61,6 +61,8 @@ class Posterior:
     names: Names
     refits: int
     temper: float
+    fits: Mapping[Names, PosteriorFit]
+    by_keys: Mapping[frozenset[str], PosteriorFit]
 
     @property
     def simplest(self) -> Names:
@@ -119,6 +121,8 @@ class _BestFirst:
         self.refits = 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
         self._read: dict[tuple[int, float], list[_Predicted]] = {}
+        self._expansions: list[Expansion] = []
+        self._told: dict[tuple[int, float], dict[frozenset[str], _Predicted]] = {}
         self._predicted: dict[frozenset[str], _Predicted] = {}
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
         self._discrepancies: dict[Names, float] = {}
@@ -146,7 +150,19 @@ class _BestFirst:
             self._refit(following)
         weights = self._weights()
         names = best.quadratic.names(best.weighed)
-        return Posterior(weights, fitted, names, self.refits, self.temper)
+        fits: dict[Names, tuple[float, PosteriorFit]] = {}
+        for key in self._fits:
+            for p in self._of_fit(key):
+                own = p.quadratic.names(p.weighed)
+                if own not in fits or p.weighed.log_evidence > fits[own][0]:
+                    fits[own] = p.weighed.log_evidence, p.expansion.last
+        by_keys = {
+            key: min((e.last for e in every), key=lambda f: f.cost) for key, every in self._fits.items()
+        }
+        fits[()] = 0.0, null
+        return Posterior(
+            weights, fitted, names, self.refits, self.temper, {n: f for n, (_, f) in fits.items()}, by_keys
+        )
 
     def _tempered(self, fitted: PosteriorFit) -> bool:
         """Set the ratio of variances to that of a fit; whether it has changed."""
@@ -157,6 +173,7 @@ class _BestFirst:
         if abs(np.log(temper / self.temper)) < _SAME:
             return False
         self.temper = temper
+        self._predicted = self._predictions()
         return True
 
     def _best(self) -> _Predicted:
@@ -178,11 +195,31 @@ class _BestFirst:
         return found
 
     def _predict(self, fitted: PosteriorFit) -> None:
-        """Enter what the quadratic about a fit predicts for every set; it replaces what others predicted."""
-        expansion = expanded(self.sets.problem, fitted, self.effects)
-        q = expansion.quadratic(self.sets.problem, self.causes, self.temper)
-        for w in sorted(q.sets(MOST_EFFECTS), key=lambda w: w.log_evidence):
-            self._predicted[q.in_filter(w)] = _Predicted(expansion, q, w)
+        """Enter the quadratic about a fit among those that predict the other sets."""
+        self._expansions.append(expanded(self.sets.problem, fitted, self.effects))
+        self._predicted = self._predictions()
+
+    def _predictions(self) -> dict[frozenset[str], _Predicted]:
+        """The sets by their effects of the filter, each as the quadratic predicts it whose fit differs from it by the fewest
+        effects; the later of two."""
+        nearest: dict[frozenset[str], tuple[int, _Predicted | None]] = {}
+        every = [(frozenset(e.key for e in x.last.hypothesis.effects), self._told_by(x)) for x in self._expansions]
+        for key in {key for _, told in every for key in told}:
+            for own, told in every:
+                apart = len(own ^ key)
+                if key not in nearest or apart <= nearest[key][0]:
+                    nearest[key] = apart, told.get(key)
+        return {key: p for key, (_, p) in nearest.items() if p is not None}
+
+    def _told_by(self, expansion: Expansion) -> dict[frozenset[str], _Predicted]:
+        at = id(expansion), self.temper
+        if at not in self._told:
+            q = expansion.quadratic(self.sets.problem, self.causes, self.temper)
+            self._told[at] = {
+                q.in_filter(w): _Predicted(expansion, q, w)
+                for w in sorted(q.sets(MOST_EFFECTS), key=lambda w: w.log_evidence)
+            }
+        return self._told[at]
 
     def _compare_discrepancy(self, best: _Predicted) -> None:
         """Enter the evidence of a discrepancy beside a set, from the quadratic about its fit."""

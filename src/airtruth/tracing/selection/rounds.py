@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -149,6 +149,7 @@ class SearchRound:
     sets: tuple[CauseSet, ...] = ()
     rival: Rival | None = None
     exchanged: tuple[PosteriorFit, ...] = ()
+    posterior: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
     @property
     def reported(self) -> PosteriorFit:

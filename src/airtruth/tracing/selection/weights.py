@@ -39,6 +39,8 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     those with one effect more. A set that two searches reach has the larger of its weights. An effect is accepted by a test, so
     that no set is empty for want of the only one.
     """
+    if rounds[-1].posterior:
+        return dict(rounds[-1].posterior)
     found: dict[tuple[str, ...], float] = {}
 
     def add(names: Collection[str], log_weight: float) -> None:
