@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -16,7 +17,7 @@ from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.selection.ranking import TIE
+from airtruth.tracing.selection.explanation import AS_GOOD
 from airtruth.units import DEG
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ Array = NDArray[np.float64]
 _LABELS: Final = ("alpha [deg]", "q [deg/s]", "az [m/s2]")
 """Names of the outputs in a figure."""
 _SCALES: Final = (1.0 / DEG, 1.0 / DEG, 1.0)
+_TIE: Final = -2.0 * math.log(AS_GOOD)
+"""Difference in 2 log L up to which two hypotheses explain the records equally well [-]."""
 """Factors from SI to the units of `_LABELS`."""
 
 
@@ -83,10 +86,10 @@ def split_probability(sigma: float) -> float:
 
     Examples
     --------
-    >>> round(split_probability(6.0**0.5), 3)
+    >>> round(split_probability(6.0**0.5), 2)
     0.5
     """
-    return float(norm.sf((TIE - sigma**2) / (2.0 * sigma))) if sigma > 0.0 else 0.0
+    return float(norm.sf((_TIE - sigma**2) / (2.0 * sigma))) if sigma > 0.0 else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,6 +30,7 @@ from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.confirmation import confirmation
 from airtruth.tracing.credit import credit
 from airtruth.tracing.declared_model import (
+    alike,
     alternatives,
     cause_scores,
     cause_sizes,
@@ -39,6 +40,7 @@ from airtruth.tracing.declared_model import (
     inclusion,
     refined_derivatives,
     remaining_evidence,
+    separation_sigma,
     with_axial_force,
 )
 from airtruth.tracing.friction import imitated_lag_s, is_late_vane
@@ -49,23 +51,20 @@ from airtruth.tracing.inference.hypothesis import is_curvature
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
+from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile
 from airtruth.tracing.next_flight import next_flight
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.record_differences import CERTAIN, differences
 from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
-from airtruth.tracing.selection.acceptance import Candidate
+from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.families import FRICTION
-from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.score_test import ScoreTable
-from airtruth.tracing.selection.significance import LEVEL
-from airtruth.tracing.selection.weights import alike_in_rivals
+from airtruth.tracing.selection.significance import CONTRADICTED, LEVEL
 from airtruth.tracing.stage_errors import Replay
-from airtruth.tracing.stages import Stages, accepted, before_fit, stage_errors
+from airtruth.tracing.stages import Stages, accepted, stage_errors
 from airtruth.tracing.tolerances import tolerances
 from airtruth.units import FT, KT
 
@@ -97,14 +96,11 @@ def conclude(
     case, first, last = stages.case, rounds[0], rounds[-1]
     motion = case.fitted.layout.motion
     effects = accepted(rounds)
-    anomaly, remaining = first.anomaly, remaining_evidence(case.fitted, last)
+    anomaly, remaining = first.anomaly, remaining_evidence(last)
     covariance = robust_covariance(case.fitted, last.reported)
-    stated = _with_rivals(
-        (
-            *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
-            *explaining_effects(rounds, covariance),
-        ),
-        rounds,
+    stated = (
+        *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
+        *explaining_effects(rounds, covariance),
     )
     along = () if axial is None else axial.increments
     declared = with_axial_force(declared_model(case.fitted, rounds, covariance, case.declared), along)
@@ -213,16 +209,10 @@ def _effect(
     best, others = own.tied[0], own.tied[1:]
     effect = best.score.effect
     span = final.hypothesis.span(effect.key)
-    rest = [
-        c.gain
-        for c in own.candidates
-        if c is not best and c.score.effect.label != effect.label and c.gain <= best.gain
-    ]
     own_covariance = covariance[final.layout.sizes, final.layout.sizes][span, span]
     stated = estimates(effect, final.point.sizes[span], own_covariance)
     if own.profile is not None:
         stated = widened_by_profile(effect, stated, own.profile)
-    stated = widened_by_rejected(effect, stated, rounds[-1], np.sqrt(np.diag(own_covariance)))
     shift = problem.alpha_shift_rad
     stated = at_measured_alpha(effect, stated, shift)
     accepted = AcceptedEffect(
@@ -230,8 +220,12 @@ def _effect(
         variant=effect.variant,
         parameters=stated,
         p_value=_p_value(own, best),
-        separation_sigma=math.sqrt(max(0.0, best.gain - max([0.0, *rest]))),
-        indistinguishable_from=tuple(sorted({c.score.effect.label for c in others} - {effect.label})),
+        separation_sigma=separation_sigma(rounds[-1], effect.label),
+        indistinguishable_from=tuple(
+            sorted(
+                {*alike(rounds[-1], effect.label), *(c.score.effect.label for c in others)} - {effect.label}
+            )
+        ),
         gain_2_log_likelihood=best.gain,
         other_variants=tuple(
             sorted(c.score.effect.variant for c in others if c.score.effect.label == effect.label)
@@ -244,22 +238,6 @@ def _effect(
     if isinstance(effect, Increment):
         return in_physical_terms(problem, final, covariance, effect, accepted)
     return accepted
-
-
-def _with_rivals(
-    stated: Sequence[AcceptedEffect], rounds: Sequence[SearchRound]
-) -> tuple[AcceptedEffect, ...]:
-    """The accepted effects with what a branch that lost has in place of each."""
-    names = [e.label for e in stated]
-    return tuple(
-        replace(
-            e,
-            indistinguishable_from=tuple(
-                sorted({*e.indistinguishable_from, *alike_in_rivals(rounds, e.label, names)})
-            ),
-        )
-        for e in stated
-    )
 
 
 def _p_value(own: SearchRound, best: Candidate) -> float:
@@ -283,21 +261,17 @@ def _candidates(
     stated: Sequence[AcceptedEffect],
     sizes: Mapping[str, tuple[float, float]],
 ) -> tuple[CandidateScore, ...]:
-    first = rounds[0]
-    refitted = {c.score.effect.key: c for c in first.candidates}
-    tied = {c.score.effect.key for r in rounds for c in r.tied}
-    tied |= {name for e in stated for name in (e.key, *e.indistinguishable_from)}
+    first, posterior = rounds[0], rounds[-1].posterior
+    named = {name for e in stated for name in (e.key, e.label, *e.indistinguishable_from)}
     rows = list(cause_scores(sizes, rounds, case.declared, stated))
     for s, p in zip(first.table.scores, first.adjusted, strict=True):
-        known = refitted.get(s.effect.key)
-        if s.effect.key in tied:
+        if s.effect.key in named or s.effect.label in named:
             why = ""
-        elif known is not None:
-            why = "; ".join(known.reasons or (Refusal.SURPASSED,))
-        elif any(step.startswith(f"refit {s.effect.key}") for step in case.left_out):
-            why = "the time budget ended before its refit"
+        elif p > LEVEL:
+            why = "its score is not significant"
         else:
-            why = "its score is not significant" if p > LEVEL else "other effects score higher"
+            weight = sum(w for names, w in posterior.items() if s.effect.label in names)
+            why = f"the sets of effects with it are improbable (posterior {weight:.2g})"
         rows.append(
             CandidateScore(
                 name=s.effect.name,
@@ -332,7 +306,7 @@ def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -
     rows = rounds[-1].null.layout.of.common.derivatives
     return Derivatives(
         declared=named(declared),
-        before=named(declared + before_fit(rounds).point.common[rows]),
+        before=named(declared + rounds[0].null.point.common[rows]),
         after=named(declared + rounds[-1].null.point.common[rows]),
         after_std=named(np.sqrt(np.diag(covariance)[rows])),
     )

@@ -10,9 +10,8 @@ import numpy as np
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.answer import AcceptedEffect
 from airtruth.tracing.inference.assess import own_likelihood
-from airtruth.tracing.inference.causes import DERIVATIVES
+from airtruth.tracing.inference.causes import DERIVATIVES, size_in_derivatives
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.release import size_in_derivatives
 from airtruth.tracing.stages import StageModel, Stages
 
 

@@ -24,25 +24,30 @@ from airtruth.tracing.answer import (
     ParameterEstimate,
     RefinedDerivative,
 )
-from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses
+from airtruth.tracing.inference.causes import (
+    DERIVATIVES,
+    DeclaredCauses,
+    size_in_derivatives,
+    size_in_filter,
+)
 from airtruth.tracing.inference.derivative_likelihood import (
     DERIVATIVES_MOVED,
     Contradiction,
     DerivativeLikelihood,
-    contradiction,
+    size_along,
 )
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.selection.explanation import CauseSet, size_of
-from airtruth.tracing.selection.ranking import TIE
-from airtruth.tracing.selection.release import CONTRADICTED, Release, size_in_derivatives, size_in_filter
+from airtruth.tracing.selection.explanation import AS_GOOD, Explanation
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.weights import weights
+from airtruth.tracing.selection.significance import CONTRADICTED
 
 Array = NDArray[np.float64]
 
 _POWER: Final = 0.8
 """Share of flights in which a traceable cause is traced [-] (convention)."""
+_LEAST_POSTERIOR: Final = 1e-300
+"""Least posterior weight whose logarithm is taken [-]: smaller ones underflow."""
 _LEAST_WEIGHT: Final = 1e-3
 """Posterior weight below which a set of causes is not listed [-] (judgement: one in a thousand)."""
 
@@ -132,14 +137,9 @@ def with_axial_force(declared: DeclaredModel, along: Sequence[AcceptedEffect]) -
     )
 
 
-def remaining_evidence(problem: TraceProblem, last: SearchRound) -> HypothesisTest:
-    """The strongest evidence of what the answer lacks: the last round's anomaly, or derivatives that nothing of it explains.
-
-    Parameters
-    ----------
-    problem : fitted records; last : last round of the search.
-    """
-    test = contradiction(problem, last.null)
+def remaining_evidence(last: SearchRound) -> HypothesisTest:
+    """The strongest evidence of what the answer lacks: the last round's anomaly, or derivatives that nothing of it explains."""
+    test = last.declared_test
     if 2.0 * test.p_value >= last.anomaly.p_value:
         return last.anomaly
     return HypothesisTest(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
@@ -168,35 +168,50 @@ def declared_p_value(rounds: Sequence[SearchRound]) -> float:
 
 
 def explaining_effects(rounds: Sequence[SearchRound], covariance: Array) -> tuple[AcceptedEffect, ...]:
-    """The effects that explain released derivatives; none where they were not released.
+    """The effects that explain the derivatives of an answer; none where they are as declared.
 
     Parameters
     ----------
     covariance : of the last fit's common parameters and sizes.
     """
-    every = [(r, r.release) for r in rounds if r.release is not None]
-    carried = {e.key for e in rounds[-1].null.hypothesis.effects}
-    stated: dict[str, AcceptedEffect] = {}
-    for i, (at, release) in enumerate(every):
-        best = release.sets[0]
-        # a later release explains what the filter does not carry
-        if i + 1 < len(every) and not set(best.effects) <= carried:
-            continue
-        gain = (every[0][0] if at is rounds[-1] else at).release_gain
-        rivals = [s.cost for s in release.sets if set(s.effects) != set(best.effects)]
-        separation = math.sqrt(max(0.0, 2.0 * (min(rivals) - best.cost))) if rivals else 0.0
-        for key in best.effects:
-            stated[key] = AcceptedEffect(
-                name=EFFECTS[key].name if key in EFFECTS else key,
-                variant=EFFECTS[key].variant if key in EFFECTS else "",
-                channel=EFFECTS[key].variant_channel if key in EFFECTS else None,
-                parameters=_estimates(key, best, rounds[-1], covariance),
-                p_value=release.test.p_value,
-                separation_sigma=separation,
-                indistinguishable_from=_look_alikes(key, best, release),
-                gain_2_log_likelihood=gain,
-            )
-    return tuple(stated.values())
+    first, last = rounds[0], rounds[-1]
+    if last.explanation is None:
+        return ()
+    before = next((r.tied[0].fit for r in reversed(rounds) if r.tied), first.null)
+    return tuple(
+        AcceptedEffect(
+            name=EFFECTS[key].name if key in EFFECTS else key,
+            variant=EFFECTS[key].variant if key in EFFECTS else "",
+            channel=EFFECTS[key].variant_channel if key in EFFECTS else None,
+            parameters=_estimates(key, last.explanation, last, covariance),
+            p_value=first.declared_test.p_value,
+            separation_sigma=separation_sigma(last, key),
+            indistinguishable_from=alike(last, key),
+            gain_2_log_likelihood=2.0 * (before.cost - last.null.cost),
+        )
+        for key in last.explanation.effects
+    )
+
+
+def alike(last: SearchRound, name: str) -> tuple[str, ...]:
+    """Names that explain the records as well in the place of one name of the answer, by the posterior of the sets."""
+    names = last.names
+    rest, least = set(names) - {name}, AS_GOOD * last.posterior.get(names, 0.0)
+    others = (
+        set(other) - rest
+        for other, weight in last.posterior.items()
+        if len(other) == len(names) and rest <= set(other) and weight >= least > 0.0
+    )
+    return tuple(sorted({other for (other,) in others} - {name}))
+
+
+def separation_sigma(last: SearchRound, name: str) -> float:
+    """Odds of the answer against the most probable set without one of its names, as standard deviations [-]."""
+    without = max((w for names, w in last.posterior.items() if name not in names), default=0.0)
+    own = last.posterior.get(last.names, 0.0)
+    if not own > without:
+        return 0.0
+    return math.sqrt(2.0 * math.log(own / max(without, _LEAST_POSTERIOR)))
 
 
 def cause_sizes(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> dict[str, tuple[float, float]]:
@@ -206,7 +221,9 @@ def cause_sizes(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> d
     ----------
     likelihood : at the first null; declared : the candidates.
     """
-    return {c.key: size_of(likelihood, c) for c in declared.causes if EFFECTS[c.key].in_derivatives}
+    return {
+        c.key: size_along(likelihood, c.direction) for c in declared.causes if EFFECTS[c.key].in_derivatives
+    }
 
 
 def cause_scores(
@@ -304,21 +321,8 @@ def _row(
     )
 
 
-def _look_alikes(key: str, best: CauseSet, release: Release) -> tuple[str, ...]:
-    """Effects that explain the derivatives as well in place of one effect of the best set."""
-    others = set(best.effects) - {key}
-    alike = {
-        extra
-        for s in release.sets
-        if 2.0 * (s.cost - best.cost) <= TIE and len(s.effects) == len(best.effects)
-        for extra in set(s.effects) - others
-        if others <= set(s.effects)
-    }
-    return tuple(sorted(alike - {key}))
-
-
 def _estimates(
-    key: str, best: CauseSet, last: SearchRound, covariance: Array
+    key: str, best: Explanation, last: SearchRound, covariance: Array
 ) -> dict[str, ParameterEstimate]:
     if key == DERIVATIVES:
         shift, std = last.null.point.common, np.sqrt(np.diag(covariance))
@@ -329,11 +333,6 @@ def _estimates(
         }
     effect = EFFECTS[key]
     first = effect.parameters[0]
-    if key in [e.key for e in last.null.hypothesis.effects]:
-        number = last.null.hypothesis.span(key).start
-        at = last.null.layout.size(number)
-        std_size = float(np.sqrt(max(covariance[at, at], 0.0)))
-        return {first.name: _normal(first.value(float(last.null.point.sizes[number])), std_size)}
     at = best.causes.index(key)
     size, std_size = best.sizes[at], best.size_std[at]
     low, value, high = (
@@ -349,10 +348,8 @@ def _normal(value: float, std: float) -> ParameterEstimate:
 
 def alternatives(rounds: Sequence[SearchRound]) -> tuple[Alternative, ...]:
     """Sets of effects with their posterior weights, the most probable first."""
-    found = weights(rounds)
-    total = sum(found.values())
-    ranked = sorted(found.items(), key=lambda item: (-item[1], item[0]))
-    return tuple(Alternative(names, w / total) for names, w in ranked if w >= _LEAST_WEIGHT * total)
+    ranked = sorted(rounds[-1].posterior.items(), key=lambda item: (-item[1], item[0]))
+    return tuple(Alternative(names, weight) for names, weight in ranked if weight >= _LEAST_WEIGHT)
 
 
 def inclusion(sets: Sequence[Alternative]) -> dict[str, float]:
@@ -362,6 +359,7 @@ def inclusion(sets: Sequence[Alternative]) -> dict[str, float]:
 
 
 __all__ = [
+    "alike",
     "alternatives",
     "cause_scores",
     "cause_sizes",
@@ -372,6 +370,7 @@ __all__ = [
     "inclusion",
     "refined_derivatives",
     "remaining_evidence",
+    "separation_sigma",
     "traceable_errors",
     "with_axial_force",
 ]

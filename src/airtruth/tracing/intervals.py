@@ -13,9 +13,6 @@ from airtruth.effects.effect import Effect
 from airtruth.tracing.accepted import ParameterEstimate
 from airtruth.tracing.answer import Z95
 from airtruth.tracing.inference.profile import Profile, location_index
-from airtruth.tracing.selection.acceptance import Candidate, has_converged
-from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.significance import MISFIT_FAMILY_LEVEL, REMAINS, significant_gain
 
 Array = NDArray[np.float64]
 
@@ -71,45 +68,6 @@ def widened_by_profile(
     return widened
 
 
-def widened_by_rejected(
-    effect: Effect, stated: dict[str, ParameterEstimate], last: SearchRound, stds: Array
-) -> dict[str, ParameterEstimate]:
-    """Estimates whose intervals contain those beside effects that explain the remaining anomaly, and are not accepted.
-
-    Where an anomaly remains the model lacks something, which may have moved the estimates. An effect that gains as much as one
-    beside an anomaly beyond doubt has to, and fails another test, shows how far.
-
-    Parameters
-    ----------
-    effect : an accepted effect; stated : its estimates.
-    last : the last round of the search.
-    stds : (parameters,) standard deviations of the estimates in the size coordinates of the effect.
-    """
-    if last.anomaly.p_value >= REMAINS:
-        return stated
-    least = significant_gain(len(last.table.scores) + len(last.null.hypothesis.effects), MISFIT_FAMILY_LEVEL)
-    rejected = [c for c in last.candidates if c.reasons and c.gain >= least and has_converged(c.fit, c.gain)]
-    widened = dict(stated)
-    for candidate in rejected:
-        for i, ends in enumerate(_beside(effect, candidate, last, stds)):
-            name = effect.parameters[i].name
-            widened[name] = _containing(widened[name], ends)
-    return widened
-
-
-def _beside(effect: Effect, rejected: Candidate, last: SearchRound, stds: Array) -> list[tuple[float, float]]:
-    """Ends of the interval of each parameter of an effect beside a candidate, as robust as those of the answer."""
-    own, beside = last.null.hypothesis.span(effect.key), rejected.fit.hypothesis.span(effect.key)
-    ends = []
-    for i, p in enumerate(effect.parameters):
-        plain = last.null.size_std(own.start + i)
-        ratio = max(float(stds[i]) / plain, 1.0) if plain > 0.0 else 1.0
-        inflated = ratio * rejected.fit.size_std(beside.start + i)
-        size = float(rejected.fit.point.sizes[beside.start + i])
-        ends.append((p.value(size - Z95 * inflated), p.value(size + Z95 * inflated)))
-    return ends
-
-
 def _containing(stated: ParameterEstimate, ends: Iterable[float]) -> ParameterEstimate:
     """The estimate with an interval that contains more ends; an end at infinity is open."""
     low, high = stated.ci95
@@ -119,4 +77,4 @@ def _containing(stated: ParameterEstimate, ends: Iterable[float]) -> ParameterEs
     return replace(stated, ci95=(_finite(bottom), _finite(top)))
 
 
-__all__ = ["at_measured_alpha", "estimates", "widened_by_profile", "widened_by_rejected"]
+__all__ = ["at_measured_alpha", "estimates", "widened_by_profile"]

@@ -143,9 +143,8 @@ def _with_one_size(
         again = tuple(s.repeated({key: e}) if _names(s, key) else s for s, e in zip(own, others, strict=True))
         pair = (again[0], again[1])
         return (own, cause) if any(_names(s, key) for s in pair) else (pair, None)
-    known = cause.effect.parameters[0].value(combined((first, second)).size)
     fitted = tuple(
-        s.refitted({key: e}) if _names(s, key) else s.beginning({key: e}, {key: known})
+        s.refitted({key: e}) if _names(s, key) else s.repeated({key: e}, (key,))
         for s, e in zip(own, others, strict=True)
     )
     pair = (fitted[0], fitted[1])

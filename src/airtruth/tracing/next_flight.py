@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.tracing.answer import ANOMALY_LEVEL, VerdictName
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
-from airtruth.tracing.selection.acceptance import Candidate
+from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.families import advice
 
 

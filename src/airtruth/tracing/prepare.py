@@ -151,7 +151,7 @@ def prepare(
         untestable=tuple(untestable),
         model=model,
         notes=tuple(notes),
-        declared=_declared_causes(fitted, aircraft, effects, options, motion),
+        declared=_declared_causes(fitted, aircraft, options, motion),
     )
 
 
@@ -193,7 +193,6 @@ def _unmeasured(channel: str, motion: Motion) -> str:
 def _declared_causes(
     fitted: Sequence[TraceRecord],
     aircraft: Aircraft,
-    effects: Sequence[Effect],
     options: TraceOptions,
     motion: Motion,
 ) -> DeclaredCauses:
@@ -204,7 +203,6 @@ def _declared_causes(
     return DeclaredCauses(
         tuple(c for c in causes if keys is None or c.key in keys),
         keys is None or DERIVATIVES in keys,
-        tuple(e for e in effects if e.key in {c.key for c in causes}),
     )
 
 

@@ -14,7 +14,7 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.acceptance import Candidate
+from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.stage_errors import STAGES, BySet, Errors, PerChannel, Rms
 
@@ -82,7 +82,7 @@ def accepted(rounds: Sequence[SearchRound]) -> list[tuple[Candidate, tuple[Candi
 
 def assess_stages(case: Case, rounds: Sequence[SearchRound]) -> Stages:
     """Assess every stage on fitted and held-out records; each has the same free parameters of the records."""
-    null, last = before_fit(rounds), rounds[-1].null
+    null, last = rounds[0].null, rounds[-1].null
     # noise levels are those of the stage before: with the declared ones only the declared model would be assessed
     declared = null.point.common.copy()
     own = case.fitted.layout.common
@@ -93,20 +93,13 @@ def assess_stages(case: Case, rounds: Sequence[SearchRound]) -> Stages:
     }
     if last.hypothesis.effects or last.hypothesis.spread is not None:
         models["after"] = _model(last)
-        first = rounds[0]
-        tied = {c.score.effect.key for c in first.tied}
-        others = [c for c in first.candidates if c.score.effect.key not in tied]
+        tied = {c.score.effect.key for c in rounds[0].tied}
+        others = [c for c in rounds[0].candidates if c.score.effect.key not in tied]
         if others:
             models["control"] = _model(others[0].fit)
     fitted = {name: _assess_all(case.fitted, m, fitted=True) for name, m in models.items()}
     held = {name: _assess_all(case.held, m, fitted=False) for name, m in models.items()} if case.held else {}
     return Stages(case, models, fitted, held)
-
-
-def before_fit(rounds: Sequence[SearchRound]) -> PosteriorFit:
-    """The fit without any effect, its derivatives released where the search released them."""
-    release = rounds[0].release
-    return rounds[0].null if release is None else release.fit
 
 
 def _model(fit: PosteriorFit) -> StageModel:
@@ -195,7 +188,6 @@ __all__ = [
     "Stages",
     "accepted",
     "assess_stages",
-    "before_fit",
     "free_run_floor",
     "stage_errors",
 ]

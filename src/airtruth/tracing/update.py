@@ -163,20 +163,24 @@ def revision_of(
     change, std = with_spread(change_at, fit.point.sizes, covariance[fit.layout.sizes, fit.layout.sizes])
     along = () if axial is None else axial.increments
     change += Change() if axial is None else axial.change
-    released = rounds[-1].null.hypothesis.spread is not None
-    release = rounds[-1].release
-    causes = release.sets[0].effects if released and release is not None else ()
+    explanation = rounds[-1].explanation
     return Revision(
         change=change,
         std=std,
         corrections=_corrections(case, fit, covariance),
         names=tuple(
-            dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *(e.key for e in along), *causes])
+            dict.fromkeys(
+                [
+                    *(e.key for e in fit.hypothesis.effects),
+                    *(e.key for e in along),
+                    *(() if explanation is None else explanation.effects),
+                ]
+            )
         ),
         bands=(*_bands(case, fit), *map(_band, along)),
         source=source_text([r.signals.run_id for r in case.fitted.records]),
         signals=tuple(r.signals for r in case.fitted.records),
-        is_needed=change != Change() or released or refit,
+        is_needed=change != Change() or explanation is not None or refit,
     )
 
 

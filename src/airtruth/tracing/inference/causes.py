@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -34,12 +34,6 @@ class Cause:
     prior: Prior
     event: str = ""
 
-    def most_probable(self, size: float, std: float) -> float:
-        """Size within its plausible range that is most probable, where records tell ``size`` with an error of ``std`` [-]."""
-        prior = self.prior
-        told = size * prior.std**2 / (prior.std**2 + std**2)
-        return min(max(told, prior.low), prior.high)
-
 
 def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
     """Every effect with a prior as a cause of the derivatives of a motion, those of one event first.
@@ -63,28 +57,32 @@ class DeclaredCauses:
     Attributes
     ----------
     causes : physical causes; wrong_allowed : whether declarations themselves may be wrong.
-    effects : effects of those causes that the filter carries, beyond first order.
-    corrections : causes of a set -> what its refit in the filter cost beyond first order [-].
     """
 
     causes: tuple[Cause, ...] = ()
     wrong_allowed: bool = True
-    effects: tuple[Effect, ...] = ()
-    corrections: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
     @property
     def keys(self) -> Collection[str]:
         """Keys of the physical causes."""
         return {c.key for c in self.causes}
 
-    def beside(self, hypothesis: Hypothesis) -> DeclaredCauses:
-        """Those that are no effect of a hypothesis, which has them free already."""
-        taken = {e.key for e in hypothesis.effects}
-        return replace(
-            self,
-            causes=tuple(c for c in self.causes if c.key not in taken),
-            effects=tuple(e for e in self.effects if e.key not in taken),
-        )
+
+def size_in_filter(effect: Effect, size: float) -> float:
+    """Size of a cause's effect in the filter: a mass or inertia divides the coefficients."""
+    return size / (1.0 - size) if effect.divides else size
 
 
-__all__ = ["DERIVATIVES", "Cause", "DeclaredCauses", "causes_of"]
+def size_in_derivatives(effect: Effect, size: float) -> float:
+    """Inverse of `size_in_filter`."""
+    return size / (1.0 + size) if effect.divides else size
+
+
+__all__ = [
+    "DERIVATIVES",
+    "Cause",
+    "DeclaredCauses",
+    "causes_of",
+    "size_in_derivatives",
+    "size_in_filter",
+]

@@ -92,6 +92,24 @@ def derivative_likelihood(
     )
 
 
+def size_along(likelihood: DerivativeLikelihood, direction: Array) -> tuple[float, float]:
+    """Size of a cause alone, without its prior, and its standard deviation.
+
+    The derivatives keep their declared uncertainty, so that size over standard deviation is standard normal where they are
+    right. Generalised least squares of the peak of the likelihood, covariance I^-1 + D, on the direction.
+
+    Parameters
+    ----------
+    direction : (derivatives,) change of the derivatives per unit of size.
+    """
+    turned = np.eye(len(likelihood.vector)) + likelihood.information @ likelihood.declared
+    seen = np.linalg.solve(turned, likelihood.vector)
+    information = float(direction @ np.linalg.solve(turned, likelihood.information) @ direction)
+    if not information > 0.0:
+        return 0.0, math.inf
+    return float(direction @ seen) / information, information**-0.5
+
+
 def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> Contradiction:
     """Test whether the mode of a fit with the declared prior lies where the declaration lets it lie.
 
@@ -173,4 +191,5 @@ __all__ = [
     "against_declaration",
     "contradiction",
     "derivative_likelihood",
+    "size_along",
 ]

@@ -1,13 +1,8 @@
-"""Best-first search over sets of effects, which no trace uses yet: quadratics predict their evidence, and the best are refitted.
+"""Best-first search over sets of effects: quadratics predict their evidence, and the best are refitted.
 
 The quadratic about the best fit predicts the evidence of every set of up to three effects. The best set without a refit is
 refitted from the predicted point, and its own quadratic gives its evidence with every explanation of the derivatives. A fit that
 leads is expanded in turn. The search ends when no set without a refit is predicted within `ODDS` of the best.
-
-A discrepancy that no effect describes is one hypothesis beside the set that leads: a smooth function, a play, a lag or a mode
-(`airtruth.tracing.selection.increments`), whose evidence is averaged over its shapes and needs no refit.
-
-`python -m studies.shadow` compares it with the search of a trace.
 """
 
 from __future__ import annotations
@@ -17,31 +12,78 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.special import logsumexp
 
-from airtruth.effects.effect import Effect, Prior
-from airtruth.effects.increment import NAME, Shape
-from airtruth.tracing.inference.causes import Cause
+from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import inflation
-from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.evidence import Quadratic, Weighed
 from airtruth.tracing.selection.expansion import Expansion, expanded
-from airtruth.tracing.selection.explanation import simplest
-from airtruth.tracing.selection.increments import screen
-from airtruth.tracing.selection.rounds import MOST_EFFECTS
+from airtruth.tracing.selection.explanation import Explanation, shares, simplest
 from airtruth.tracing.selection.set_table import SetTable
 
 ODDS: Final = 3.0
 """Log-evidence behind the best set from which a set is not refitted [-] (judgement: odds of one in twenty)."""
 REFITS: Final = 30
 """Largest number of refits [-] (judgement: ten to forty seconds)."""
+MOST_EFFECTS: Final = 3
+"""Largest number of effects of a set that a quadratic predicts [-] (judgement: four in a few records have not been separable)."""
 _SAME: Final = 0.05
 """Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 Names = tuple[str, ...]
 """Names of a set, sorted."""
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A set with its evidence.
+
+    Attributes
+    ----------
+    expansion : about the fit that tells; quadratic, weighed : the set in it.
+    """
+
+    expansion: Expansion
+    quadratic: Quadratic
+    weighed: Weighed
+
+    @property
+    def names(self) -> Names:
+        """Names of the set."""
+        return self.quadratic.names(self.weighed)
+
+    @property
+    def explains_derivatives(self) -> bool:
+        """Whether it holds wrong declarations, or causes that the filter does not carry."""
+        return bool(self.weighed.declaration.wrong) or any(
+            self.quadratic.columns[i].cause for i in self.weighed.columns
+        )
+
+    @property
+    def is_refitted(self) -> bool:
+        """Whether the fit has the effects of the set, and its own prior of the derivatives."""
+        fitted = self.expansion.last.hypothesis
+        own = {e.key for e in fitted.effects} == self.quadratic.in_filter(self.weighed)
+        return own and (fitted.spread is not None) == self.explains_derivatives
+
+    @property
+    def explanation(self) -> Explanation | None:
+        """What it states of the derivatives; None where it leaves them as they are declared."""
+        if not self.explains_derivatives:
+            return None
+        q, w = self.quadratic, self.weighed
+        sizes, std = q.alone(w)
+        at = [k for k, i in enumerate(w.columns) if q.columns[i].cause is not None]
+        motion = self.expansion.last.hypothesis.motion
+        return Explanation(
+            tuple(q.columns[w.columns[k]].key for k in at),
+            tuple(motion.parameters[i] for i in w.declaration.wrong),
+            tuple(float(sizes[k]) for k in at),
+            tuple(float(std[k]) for k in at),
+        )
 
 
 @dataclass(frozen=True)
@@ -51,32 +93,29 @@ class Posterior:
     Attributes
     ----------
     weights : names of each set -> its posterior probability among all sets, the most probable first.
-    best : the fit of the most probable set; names : of that set.
+    evaluated : names of each set -> its most probable member, refitted where one was.
+    fits : keys of the effects of the filter -> their most probable fit under the declaration.
+    null : fit without any effect.
     refits : number of refits, that without any effect included.
     temper : long-run variance of the slopes of the likelihood over that of white innovations [-].
     """
 
     weights: Mapping[Names, float]
-    best: PosteriorFit
-    names: Names
+    evaluated: Mapping[Names, Evaluated]
+    fits: Mapping[frozenset[str], PosteriorFit]
+    null: PosteriorFit
     refits: int
     temper: float
-    fits: Mapping[Names, PosteriorFit]
-    by_keys: Mapping[frozenset[str], PosteriorFit]
 
     @property
     def simplest(self) -> Names:
         """The set of an answer, see `airtruth.tracing.selection.explanation.simplest`."""
         return simplest(self.weights)
 
-
-@dataclass(frozen=True)
-class _Predicted:
-    """A set as a quadratic predicts it."""
-
-    expansion: Expansion
-    quadratic: Quadratic
-    weighed: Weighed
+    @property
+    def best(self) -> PosteriorFit:
+        """Fit of the most probable set."""
+        return self.evaluated[next(iter(self.weights))].expansion.last
 
 
 def best_first(
@@ -84,24 +123,22 @@ def best_first(
     hypothesis: Hypothesis,
     start: Parameters,
     effects: Sequence[Effect],
-    causes: Sequence[Cause],
-    shapes: Sequence[Shape] = (),
+    declared: DeclaredCauses,
+    advance: Advance = lambda step: None,
 ) -> Posterior | None:
     """Posterior probabilities of the sets of effects; None where not even the declared aircraft can be fitted.
 
     Parameters
     ----------
     sets : fits of the search; hypothesis, start : the declared aircraft, and where the search for its parameters begins.
-    effects : candidates of the filter; causes : of changed derivatives.
-    shapes : of a discrepancy that no effect describes; none leaves this hypothesis out.
+    effects : candidates of the filter; declared : what else changes the derivatives.
+    advance : receives the step that begins, or holds the time budget.
     """
     null = sets.converged(hypothesis, start)
     if null is None:
         return None
-    held = {e.key for e in effects}
-    others = tuple(c for c in causes if c.key not in held)
-    own = _BestFirst(sets, hypothesis, tuple(effects), others, tuple(shapes))
-    return own.run(null)
+    free = tuple(e for e in effects if e.parameters[0].low < e.parameters[0].high)
+    return _BestFirst(sets, hypothesis, free, declared, advance).run(null)
 
 
 class _BestFirst:
@@ -112,20 +149,21 @@ class _BestFirst:
         sets: SetTable,
         hypothesis: Hypothesis,
         effects: tuple[Effect, ...],
-        causes: tuple[Cause, ...],
-        shapes: tuple[Shape, ...],
+        declared: DeclaredCauses,
+        advance: Advance,
     ) -> None:
-        self.sets, self.hypothesis, self.effects, self.causes = sets, hypothesis, effects, causes
-        self.shapes = shapes
+        held = {e.key for e in effects}
+        self.sets, self.hypothesis, self.effects, self.advance = sets, hypothesis, effects, advance
+        self.causes = tuple(c for c in declared.causes if c.key not in held)
+        self.wrong_allowed = declared.wrong_allowed
         self.temper = 1.0
         self.refits = 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
-        self._read: dict[tuple[int, float], list[_Predicted]] = {}
+        self._read: dict[tuple[int, float], list[Evaluated]] = {}
         self._expansions: list[Expansion] = []
-        self._told: dict[tuple[int, float], dict[frozenset[str], _Predicted]] = {}
-        self._predicted: dict[frozenset[str], _Predicted] = {}
+        self._told: dict[tuple[int, float], dict[frozenset[str], Evaluated]] = {}
+        self._predicted: dict[frozenset[str], Evaluated] = {}
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
-        self._discrepancies: dict[Names, float] = {}
 
     def run(self, null: PosteriorFit) -> Posterior:
         """Refit set after set until no other one can come within the odds."""
@@ -143,26 +181,18 @@ class _BestFirst:
             if not any(fitted is other for other in seen):
                 seen.append(fitted)
                 self._predict(fitted)
-                self._compare_discrepancy(best)
             following = self._following(best)
             if following is None or self.refits >= REFITS:
                 break
+            if not may_begin(self.advance, f"refit {' + '.join(following.names)}"):
+                break
             self._refit(following)
-        weights = self._weights()
-        names = best.quadratic.names(best.weighed)
-        fits: dict[Names, tuple[float, PosteriorFit]] = {}
-        for key in self._fits:
-            for p in self._of_fit(key):
-                own = p.quadratic.names(p.weighed)
-                if own not in fits or p.weighed.log_evidence > fits[own][0]:
-                    fits[own] = p.weighed.log_evidence, p.expansion.last
-        by_keys = {
-            key: min((e.last for e in every), key=lambda f: f.cost) for key, every in self._fits.items()
+        logs, evaluated = self._evidence()
+        fits = {
+            key: min((e.last for e in every), key=lambda f: (f.hypothesis.spread is not None, f.cost))
+            for key, every in self._fits.items()
         }
-        fits[()] = 0.0, null
-        return Posterior(
-            weights, fitted, names, self.refits, self.temper, {n: f for n, (_, f) in fits.items()}, by_keys
-        )
+        return Posterior(_normalised(logs), evaluated, fits, null, self.refits, self.temper)
 
     def _tempered(self, fitted: PosteriorFit) -> bool:
         """Set the ratio of variances to that of a fit; whether it has changed."""
@@ -176,21 +206,21 @@ class _BestFirst:
         self._predicted = self._predictions()
         return True
 
-    def _best(self) -> _Predicted:
+    def _best(self) -> Evaluated:
         """The most probable set with a refit."""
         every = [p for key in self._fits for p in self._of_fit(key)]
         return max(every, key=lambda p: p.weighed.log_evidence)
 
-    def _of_fit(self, key: frozenset[str]) -> list[_Predicted]:
+    def _of_fit(self, key: frozenset[str]) -> list[Evaluated]:
         """The sets with some effects of the filter that their fits weigh: with each explanation of the derivatives."""
-        found: list[_Predicted] = []
+        found: list[Evaluated] = []
         for expansion in self._fits[key]:
             at = id(expansion), self.temper
             if at not in self._read:
-                q = expansion.quadratic(self.sets.problem, self.causes, self.temper)
+                q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
                 every = q.sets(min(MOST_EFFECTS + 1, len(key) + 2))
                 own = (w for w in every if q.in_filter(w) == key)
-                self._read[at] = [_Predicted(expansion, q, w) for w in own]
+                self._read[at] = [Evaluated(expansion, q, w) for w in own]
             found += self._read[at]
         return found
 
@@ -199,11 +229,13 @@ class _BestFirst:
         self._expansions.append(expanded(self.sets.problem, fitted, self.effects))
         self._predicted = self._predictions()
 
-    def _predictions(self) -> dict[frozenset[str], _Predicted]:
+    def _predictions(self) -> dict[frozenset[str], Evaluated]:
         """The sets by their effects of the filter, each as the quadratic predicts it whose fit differs from it by the fewest
         effects; the later of two."""
-        nearest: dict[frozenset[str], tuple[int, _Predicted | None]] = {}
-        every = [(frozenset(e.key for e in x.last.hypothesis.effects), self._told_by(x)) for x in self._expansions]
+        nearest: dict[frozenset[str], tuple[int, Evaluated | None]] = {}
+        every = [
+            (frozenset(e.key for e in x.last.hypothesis.effects), self._told_by(x)) for x in self._expansions
+        ]
         for key in {key for _, told in every for key in told}:
             for own, told in every:
                 apart = len(own ^ key)
@@ -211,53 +243,45 @@ class _BestFirst:
                     nearest[key] = apart, told.get(key)
         return {key: p for key, (_, p) in nearest.items() if p is not None}
 
-    def _told_by(self, expansion: Expansion) -> dict[frozenset[str], _Predicted]:
+    def _told_by(self, expansion: Expansion) -> dict[frozenset[str], Evaluated]:
         at = id(expansion), self.temper
         if at not in self._told:
-            q = expansion.quadratic(self.sets.problem, self.causes, self.temper)
+            q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
             self._told[at] = {
-                q.in_filter(w): _Predicted(expansion, q, w)
+                q.in_filter(w): Evaluated(expansion, q, w)
                 for w in sorted(q.sets(MOST_EFFECTS), key=lambda w: w.log_evidence)
             }
         return self._told[at]
 
-    def _compare_discrepancy(self, best: _Predicted) -> None:
-        """Enter the evidence of a discrepancy beside a set, from the quadratic about its fit."""
-        if not self.shapes:
-            return
-        total = sum(shape.prior_weight for shape in self.shapes)
-        screened = screen(self.sets.problem, best.expansion.last, NO_WHITENER, self.shapes)
-        logs = [
-            s.log_evidence / self.temper + float(np.log(s.effect.shape.prior_weight / total))
-            for s in screened
-        ]
-        if logs:
-            names = tuple(sorted({*best.quadratic.names(best.weighed), NAME}))
-            own = best.weighed.log_evidence + Prior.log_odds
-            self._discrepancies[names] = own + float(logsumexp(logs))
-
-    def _following(self, best: _Predicted) -> _Predicted | None:
-        """The set to refit next: the best one under the prior of its own derivatives, else the best without a refit."""
-        own = best.weighed
-        explains = own.declaration.wrong or any(best.quadratic.columns[i].cause for i in own.columns)
-        if explains and self._is_new(best):
+    def _following(self, best: Evaluated) -> Evaluated | None:
+        """The set to refit next: the best one under the prior of its own derivatives, the best without a refit, and at last the
+        simplest one that an answer can state."""
+        if self._wants(best):
             return best
         left = (p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p))
-        least = max([own.log_evidence, *self._discrepancies.values()]) - ODDS
-        return max(
+        least = best.weighed.log_evidence - ODDS
+        leading = max(
             (p for p in left if p.weighed.log_evidence > least),
             key=lambda p: p.weighed.log_evidence,
             default=None,
         )
+        if leading is not None:
+            return leading
+        logs, evaluated = self._evidence()
+        answer = evaluated[simplest(_normalised(logs))]
+        return answer if self._wants(answer) else None
 
-    def _is_new(self, p: _Predicted) -> bool:
+    def _wants(self, p: Evaluated) -> bool:
+        return self._is_new(p) and (p.explains_derivatives or not p.is_refitted)
+
+    def _is_new(self, p: Evaluated) -> bool:
         return self._row(p) not in self._tried
 
     @staticmethod
-    def _row(p: _Predicted) -> tuple[frozenset[str], Names, tuple[int, ...]]:
-        return p.quadratic.in_filter(p.weighed), p.quadratic.names(p.weighed), p.weighed.declaration.wrong
+    def _row(p: Evaluated) -> tuple[frozenset[str], Names, tuple[int, ...]]:
+        return p.quadratic.in_filter(p.weighed), p.names, p.weighed.declaration.wrong
 
-    def _refit(self, p: _Predicted) -> None:
+    def _refit(self, p: Evaluated) -> None:
         """Refit a set from its predicted point, and from the declared aircraft where that leads nowhere."""
         self._tried.add(self._row(p))
         hypothesis, start = self._start(p)
@@ -273,7 +297,7 @@ class _BestFirst:
             key = frozenset(e.key for e in hypothesis.effects)
             self._fits.setdefault(key, []).append(expanded(self.sets.problem, own))
 
-    def _start(self, p: _Predicted) -> tuple[Hypothesis, Parameters]:
+    def _start(self, p: Evaluated) -> tuple[Hypothesis, Parameters]:
         """The hypothesis of a set with its own prior of the derivatives, and the point where the quadratic is least."""
         q, w = p.quadratic, p.weighed
         spread = w.declaration.spread.copy()
@@ -296,29 +320,38 @@ class _BestFirst:
         total = spread + of_cause
         return replace(self.hypothesis, effects=effects, spread=total if total.any() else None), point
 
-    def _weights(self) -> dict[Names, float]:
-        """Names of each set -> posterior probability; a set without a refit has the predicted evidence."""
+    def _evidence(self) -> tuple[dict[Names, float], dict[Names, Evaluated]]:
+        """Names of each set -> log-evidence, and its most probable member; a set without a refit has the predicted evidence."""
         logs: dict[Names, float] = {}
+        evaluated: dict[Names, Evaluated] = {}
+
+        def add(p: Evaluated) -> None:
+            names, log = p.names, p.weighed.log_evidence
+            logs[names] = float(np.logaddexp(logs.get(names, -np.inf), log))
+            known = evaluated.get(names)
+            if known is None or (p.is_refitted, log) > (known.is_refitted, known.weighed.log_evidence):
+                evaluated[names] = p
+
         for key in self._fits:
-            best: dict[tuple[tuple[int, ...], tuple[int, ...], float], _Predicted] = {}
+            best: dict[tuple[tuple[int, ...], tuple[int, ...], float], Evaluated] = {}
             for p in self._of_fit(key):
                 d = p.weighed.declaration
                 row = p.weighed.columns, d.wrong, float(np.trace(d.spread))
                 if row not in best or p.weighed.log_evidence > best[row].weighed.log_evidence:
                     best[row] = p
             for p in best.values():
-                names = p.quadratic.names(p.weighed)
-                logs[names] = np.logaddexp(logs.get(names, -np.inf), p.weighed.log_evidence)
+                add(p)
         for key, p in self._predicted.items():
             if key not in self._fits and self._is_new(p):
-                names = p.quadratic.names(p.weighed)
-                logs[names] = np.logaddexp(logs.get(names, -np.inf), p.weighed.log_evidence)
-        for names, log in self._discrepancies.items():
-            logs[names] = np.logaddexp(logs.get(names, -np.inf), log)
-        top = max(logs.values())
-        total = sum(np.exp(log - top) for log in logs.values())
-        order = sorted(logs, key=lambda names: -logs[names])
-        return {names: float(np.exp(logs[names] - top) / total) for names in order}
+                add(p)
+        return logs, evaluated
 
 
-__all__ = ["ODDS", "Posterior", "best_first"]
+def _normalised(logs: Mapping[Names, float]) -> dict[Names, float]:
+    """Posterior probabilities, the largest first."""
+    top = max(logs.values())
+    order = sorted(logs, key=lambda names: (-logs[names], names))
+    return shares({names: float(np.exp(logs[names] - top)) for names in order})
+
+
+__all__ = ["ODDS", "Evaluated", "Posterior", "best_first"]

@@ -1,4 +1,4 @@
-"""Evidence of every set of effects by one quadratic of the log-likelihood about a fit, for `best_first` alone.
+"""Evidence of every set of effects by one quadratic of the log-likelihood about a fit.
 
 About a fit the negative log-likelihood is nearly quadratic in x, the increments of the derivatives and the sizes of all
 effects, with every other parameter eliminated under its prior:
@@ -12,7 +12,8 @@ declaration is wrong. With the derivatives eliminated under this prior, the size
 
 where c is the long-run variance of the slopes of the likelihood over that of white innovations, and s_m the sizes of the largest
 likelihood. A size without a stated prior is log-uniform between the smallest size that matters and the end of its range, so
-that neither its unit nor its usual magnitude enters.
+that neither its unit nor its usual magnitude enters. What other records tell of a size, N(b, s), is a likelihood and multiplies
+this density: it adds x^2/(2 s^2) - x b/s^2 to f.
 
 Sources: D. J. C. MacKay, Neural Computation 4 (1992) 415-447 (evidence and its Occam factor); R. E. Kass and A. E. Raftery,
 J. Am. Statist. Assoc. 90 (1995) 773-795, section 4.1 (Laplace's method); F. Pauli, W. Racugno and L. Ventura, Statist. Sinica 21
@@ -22,7 +23,6 @@ J. Am. Statist. Assoc. 90 (1995) 773-795, section 4.1 (Laplace's method); F. Pau
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -33,17 +33,26 @@ from scipy.special import log_ndtr
 
 from airtruth.effects.effect import Effect, Prior
 from airtruth.tracing.inference.causes import DERIVATIVES, Cause
-from airtruth.tracing.selection.explanation import LOG_SAME_EVENT, LOG_WRONG, WRONG_BY
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+WRONG_BY: Final = (3.0, 10.0)
+"""Standard deviation of a derivative whose declaration is wrong, over the declared one [-]: equal parts of a mixture
+(judgement: published uncertainties of derivatives are often too small by the first factor, and by up to the second)."""
+LOG_SAME_EVENT: Final = -1.0
+"""Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
+LOG_WRONG: Final = -1.0
+"""Logarithm of the prior odds of wrong declarations, and of each derivative that they concern [-] (judgement: they are
+the most frequent cause)."""
 SINGULAR: Final = 1e-6
 """Least share of an information that remains beside the others of a set [-] (judgement: less is no other effect)."""
 _LEAST_SHAPE: Final = 0.1
 """Uncertainty of the shape of a cause from which it widens the derivatives [-] (judgement: less is second order)."""
 _NEGLIGIBLE: Final = 15.0
 """Log-evidence behind the best set of a size from which a set is left out [-] (judgement: a weight of 3e-7)."""
+_EVERY: Final = 6
+"""Number of derivatives of which every set of wrong declarations is compared [-] (judgement: 64 sets; of 15 there are 32768)."""
 _WRONG_BESIDE: Final = 4
 """Number of sets of wrong declarations that are compared beside more than one effect [-] (judgement)."""
 
@@ -109,6 +118,14 @@ class EffectColumn:
         """Whether it widens the prior of the derivatives."""
         return bool(self.freed) or (self.cause is not None and self.cause.prior.shape > _LEAST_SHAPE)
 
+    @property
+    def told(self) -> tuple[float, float]:
+        """Precision s^-2 of what other records tell of the size, and the precision times their mean b; zero for nothing."""
+        if self.effect is None:
+            return 0.0, 0.0
+        first = self.effect.parameters[0]
+        return first.prior_std**-2.0, first.prior_mean * first.prior_std**-2.0
+
     def may_join(self, other: EffectColumn) -> bool:
         """Whether both may be in one set: not two variants of one effect, but delays of two channels."""
         late = [("" if c.effect is None else c.effect.late_signal) for c in (self, other)]
@@ -171,6 +188,7 @@ class Quadratic:
     derivatives : number of derivatives.
     columns : the effects, in the order of the sizes.
     temper : c of the module's formula [-].
+    wrong_allowed : whether declarations of derivatives may be wrong.
     """
 
     offset: float
@@ -180,6 +198,7 @@ class Quadratic:
     derivatives: int
     columns: tuple[EffectColumn, ...]
     temper: float = 1.0
+    wrong_allowed: bool = True
 
     @property
     def first(self) -> int:
@@ -195,6 +214,10 @@ class Quadratic:
         return np.array([c.log_odds for c in self.columns])
 
     @cached_property
+    def _told(self) -> Array:
+        return np.array([c.told for c in self.columns]).reshape(-1, 2).T
+
+    @cached_property
     def _size_priors(self) -> _SizePriors:
         return _SizePriors(*np.array([_size_prior(c) for c in self.columns]).reshape(-1, 6).T)
 
@@ -208,9 +231,11 @@ class Quadratic:
         k, g, h = self.first, self.slope / self.temper, self.information / self.temper
         turned, gain = self._gain(spread)
         across = h[k:, :k]
+        precision, pull = self._told
         own = -self.offset / self.temper + 0.5 * float(g[:k] @ gain @ g[:k])
         own -= 0.5 * float(np.linalg.slogdet(turned)[1])
-        return own, g[k:] - across @ gain @ g[:k], h[k:, k:] - across @ gain @ across.T
+        slope = g[k:] - across @ gain @ g[:k] - pull
+        return own, slope, h[k:, k:] - across @ gain @ across.T + np.diag(precision)
 
     def most_probable(self, spread: Array, sizes: Array) -> Array:
         """(declared,) the most probable declared parameters at given sizes of all columns."""
@@ -238,13 +263,12 @@ class Quadratic:
 
     def sets(self, most: int) -> list[Weighed]:
         """Every set of up to ``most`` effects with its evidence, but for negligible ones; wrong declarations count as none."""
-        right, *wrong = self._declarations()
         special = [i for i, c in enumerate(self.columns) if c.widens]
         found: list[Weighed] = []
         for number in range(min(most, 2) + 1):
             for beside in itertools.combinations(special, number):
-                found += self._sets(right, beside, most - number)
-        alone = [(d, self._sets(d, (), min(most, 1))) for d in wrong]
+                found += self._sets(self._declaration(()), beside, most - number)
+        alone = [(d, self._sets(d, (), min(most, 1))) for d in self._wrong]
         alone.sort(key=lambda pair: -max(w.log_evidence for w in pair[1]))
         for number, (declaration, own) in enumerate(alone):
             found += own
@@ -252,6 +276,17 @@ class Quadratic:
                 found += [w for w in self._sets(declaration, (), 2) if len(w.columns) > 1]
                 found += [w for i in special for w in self._sets(declaration, (i,), 1)]
         return found
+
+    def alone(self, weighed: Weighed) -> tuple[Array, Array]:
+        """(number,) sizes of a set and their standard deviations, without any prior of the sizes."""
+        spread = weighed.declaration.spread.copy()
+        for i in weighed.columns:
+            if self.columns[i].widens:
+                spread += self.widening(i)
+        _, slope, information = self.given(spread)
+        rows = list(weighed.columns)
+        covariance = np.linalg.pinv(information[np.ix_(rows, rows)], hermitian=True)
+        return -covariance @ slope[rows], np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def names(self, weighed: Weighed) -> tuple[str, ...]:
         """Names of a set, sorted; wrong declarations are one name."""
@@ -262,17 +297,42 @@ class Quadratic:
         """Keys of the effects of a set that the filter holds."""
         return frozenset(self.columns[i].key for i in weighed.columns if self.columns[i].effect is not None)
 
-    def _declarations(self) -> Iterator[Declaration]:
-        """The declaration as it is, then every set of wrong ones, each by every factor of `WRONG_BY`."""
-        n = self.derivatives
-        yield Declaration((), np.zeros((n, n)), 0.0)
-        for count in range(1, n + 1):
-            odds = LOG_WRONG * (1 + count) - float(np.log(len(WRONG_BY)))
-            for wrong in itertools.combinations(range(n), count):
-                for by in WRONG_BY:
-                    spread = np.zeros((n, n))
-                    spread[wrong, wrong] = (by**2 - 1.0) * self.declared[wrong, wrong]
-                    yield Declaration(wrong, spread, odds)
+    @cached_property
+    def _wrong(self) -> tuple[Declaration, ...]:
+        """The wrong declarations that are compared, each by every factor of `WRONG_BY`: every set of a few derivatives; of many,
+        all of them together and the sets that add one derivative to the best one, as long as the evidence grows."""
+        every = range(self.derivatives)
+        if not self.wrong_allowed:
+            return ()
+        if self.derivatives <= _EVERY:
+            subsets = (s for n in every for s in itertools.combinations(every, n + 1))
+            return tuple(self._declaration(s, by) for s in subsets for by in WRONG_BY)
+        found = [self._declaration(tuple(every), by) for by in WRONG_BY]
+        wrong: tuple[int, ...] = ()
+        least = -np.inf
+        while len(wrong) < self.derivatives:
+            grown = [
+                self._declaration(tuple(sorted((*wrong, i))), by)
+                for i in every
+                if i not in wrong
+                for by in WRONG_BY
+            ]
+            found += grown
+            logs = [self.given(d.spread)[0] + d.log_odds for d in grown]
+            best = int(np.argmax(logs))
+            if not logs[best] > least:
+                break
+            least, wrong = logs[best], grown[best].wrong
+        return tuple(found)
+
+    def _declaration(self, wrong: tuple[int, ...], by: float = 1.0) -> Declaration:
+        """A set of wrong declarations by a factor of their standard deviations; the declaration as it is for none."""
+        spread = np.zeros((self.derivatives, self.derivatives))
+        if not wrong:
+            return Declaration((), spread, 0.0)
+        at = list(wrong)
+        spread[at, at] = (by**2 - 1.0) * np.diag(self.declared)[at]
+        return Declaration(wrong, spread, LOG_WRONG * (1 + len(wrong)) - float(np.log(len(WRONG_BY))))
 
     def _sets(self, declaration: Declaration, beside: tuple[int, ...], most: int) -> list[Weighed]:
         """Sets of columns that do not widen the derivatives, in addition to ``beside``."""

@@ -82,12 +82,19 @@ class Expansion:
             own_sizes[0] = np.clip(own_sizes[0], *self.effects[i].parameters[0].reach)
         return Parameters(moved, per_record, np.concatenate([np.zeros(0), *every]), entries)
 
-    def quadratic(self, problem: TraceProblem, causes: Sequence[Cause], temper: float = 1.0) -> Quadratic:
+    def quadratic(
+        self,
+        problem: TraceProblem,
+        causes: Sequence[Cause],
+        temper: float = 1.0,
+        wrong_allowed: bool = True,
+    ) -> Quadratic:
         """The likelihood alone, in the declared parameters, the sizes, and causes that change the derivatives.
 
         Parameters
         ----------
         temper : long-run variance of the slopes over that of white innovations [-].
+        wrong_allowed : whether declarations of derivatives may be wrong.
         """
         last, hypothesis, common = self.last, self.last.hypothesis, problem.layout.common
         declared = [*range(common.derivatives.stop), common.inertia]
@@ -96,9 +103,14 @@ class Expansion:
         gradient, information = self.marginal.gradient.copy(), self.marginal.information.copy()
         gradient[declared] -= precision @ at
         information[np.ix_(declared, declared)] -= precision
+        told, pull, sizes = hypothesis.size_precision, hypothesis.size_pull, last.point.sizes
+        rows = np.arange(len(sizes)) + last.layout.sizes.start
+        gradient[rows] -= told * sizes - pull
+        information[rows, rows] -= told
         g, h = eliminated(gradient, information, [*declared, *self.columns.tolist()])
         x = np.concatenate([at, self.at])
-        offset = last.cost - 0.5 * float(at @ precision @ at) - float(g @ x) + 0.5 * float(x @ h @ x)
+        stated = 0.5 * float(at @ precision @ at + told @ sizes**2) - float(pull @ sizes)
+        offset = last.cost - stated - float(g @ x) + 0.5 * float(x @ h @ x)
         along = np.zeros((len(x), len(causes)))
         for k, cause in enumerate(causes):
             along[common.derivatives, k] = cause.direction
@@ -125,6 +137,7 @@ class Expansion:
                 *(EffectColumn(cause=cause) for cause in causes),
             ),
             temper,
+            wrong_allowed,
         )
 
 

@@ -19,13 +19,12 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.selection.acceptance import Candidate, Reference, has_converged, tested_on_left_out
+from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increments import Screened
-from airtruth.tracing.selection.refit import refit_without
+from airtruth.tracing.selection.predictive import Reference, has_converged, tested_on_left_out
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.score_test import Score
-from airtruth.tracing.selection.set_table import SetTable
 
 Array = NDArray[np.float64]
 
@@ -178,16 +177,7 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
             else []
         ),
     )
-    return Candidate(
-        score=evidence_score(own),
-        fit=own.fit,
-        gain=gain,
-        likelihood_gain=left_out.likelihood_gain,
-        free_run_gain=left_out.free_run_gain,
-        size=swing,
-        std=float("nan"),
-        reasons=reasons,
-    )
+    return Candidate(evidence_score(own), own.fit, gain, reasons)
 
 
 def is_apart_from_zero(bends: Array, covariance: Array, degrees: float) -> bool:
@@ -276,22 +266,6 @@ def evidence_score(own: FittedIncrement) -> Score:
     )
 
 
-def redundant_increment(sets: SetTable, fitted: PosteriorFit, tried: float) -> Increment | None:
-    """The first increment that the last effect makes redundant: its posterior odds beside the others are too low.
-
-    Parameters
-    ----------
-    fitted : a fit with its effects in the order of their acceptance.
-    tried : see `log_evidence`.
-    """
-    for effect in fitted.hypothesis.effects[:-1]:
-        if isinstance(effect, Increment):
-            less = refit_without(sets, fitted, effect)
-            if less is not None and log_evidence(less, fitted, effect, tried) < LEAST_ODDS:
-                return effect
-    return None
-
-
 __all__ = [
     "LEAST_ODDS",
     "FittedIncrement",
@@ -302,7 +276,6 @@ __all__ = [
     "fitted_bends",
     "is_apart_from_zero",
     "log_evidence",
-    "redundant_increment",
     "refitted",
     "relative_swing",
 ]

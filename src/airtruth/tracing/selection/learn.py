@@ -2,39 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.special import expit
 
 from airtruth.effects.effect import Effect
-from airtruth.effects.increment import Increment, Shape
-from airtruth.tracing.inference.causes import DeclaredCauses
-from airtruth.tracing.inference.derivative_likelihood import contradiction
+from airtruth.effects.increment import NAME, Increment, Shape
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.selection.acceptance import Candidate, reference_of, untested
 from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.candidate import Candidate
+from airtruth.tracing.selection.explanation import shares
 from airtruth.tracing.selection.increment_fit import (
-    FittedIncrement,
     assessed,
     converged,
     evidence_score,
-    log_evidence,
-    redundant_increment,
     refitted,
 )
 from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
-from airtruth.tracing.selection.outcome import settled, total_cost
-from airtruth.tracing.selection.pruning import pruned
-from airtruth.tracing.selection.ranking import TIE
+from airtruth.tracing.selection.predictive import reference_of
 from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.release import CONTRADICTED, explained
-from airtruth.tracing.selection.rounds import NOTHING_DECLARED, Rival, SearchRound, scored_round
+from airtruth.tracing.selection.rounds import SearchRound, scored
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.significance import REMAINS
+from airtruth.tracing.selection.significance import CONTRADICTED, REMAINS
 
+TIE: Final = 6.0
+"""Difference in 2 log L up to which two increments explain the records equally well [-] (judgement: a likelihood ratio of 20)."""
 MOST_INCREMENTS: Final = 3
 """Largest number of increments that a trace accepts [-] (judgement: lift, moment and one with memory)."""
 LEAST_RECORDS: Final = 3
@@ -69,68 +65,39 @@ def with_increments(
     effects: Sequence[Effect],
     seed: int,
     advance: Advance = lambda step: None,
-    declared: DeclaredCauses = NOTHING_DECLARED,
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search with increments of what its effects leave.
 
     Where an anomaly remains, increments are learned beside the named effects, and so are evident ones where none remains.
-    Instead of names they are learned in any case: names that fit may imitate what the library lacks. Causes of released
+    Instead of names they are learned in any case: names that fit may imitate what the library lacks. Causes of changed
     derivatives have such rivals where they leave the derivatives contradicted. The names remain unless increments alone have a
-    much larger evidence. Names that the increments make unnecessary are given up, and so is the release of the derivatives.
+    much larger evidence.
 
     Parameters
     ----------
     rounds : a finished search; effects : its candidates, whose scores the later rounds state.
     seed : seed of the draws behind p-values; advance : receives the step that begins.
-    declared : candidates that explain released derivatives, which they do again beside the increments.
     """
     if len(sets.problem.records) < LEAST_RECORDS or not rounds:
         return rounds
-    grown = _learned(sets, rounds, effects, seed, advance)
-    if len(grown) == len(rounds) and grown[-1].null is rounds[-1].null:
-        return grown
-    grown = pruned(sets, grown, effects, seed, REMAINS, advance)
-    last = grown[-1]
-    if last.null.hypothesis.spread is None:
-        return grown
-    first = next((r.release for r in rounds if r.release is not None), None)
-    if first is not None:
-        declared = replace(declared, corrections=first.corrections)
-    return settled(sets, (*grown[:-1], replace(last, sets=explained(sets.problem, last.null, declared))))
-
-
-def _learned(
-    sets: SetTable,
-    rounds: tuple[SearchRound, ...],
-    effects: Sequence[Effect],
-    seed: int,
-    advance: Advance,
-) -> tuple[SearchRound, ...]:
-    """The rounds with increments beside the names, or instead of them."""
     learn = _Learning(sets, tuple(effects), seed, advance)
     grown, evidence = learn.grown(rounds)
-    named = rounds[-1].null.hypothesis.effects
     last = rounds[-1]
-    explains = last.sets[0].effects if last.sets else ()
-    unexplained = bool(explains) and contradiction(sets.problem, last.null).p_value <= CONTRADICTED
-    released = rounds[0].release is not None or last.null.hypothesis.spread is not None
-    if not unexplained and (released or not named):
+    explained = last.explanation is not None
+    unexplained = explained and last.declared_test.p_value <= CONTRADICTED
+    if not unexplained and (explained or not last.null.hypothesis.effects):
         return grown
-    bare = (replace(rounds[0], tied=(), profile=None, release=None, sets=()),)
-    gain = bare[0].null.cost - (total_cost(last) - evidence)
+    bare = (replace(rounds[0], candidates=(), tied=(), profile=None),)
+    gain = bare[0].null.cost - last.null.cost - len(last.null.point.sizes) + evidence
     promising = _PROMISING * gain if last.anomaly.p_value > REMAINS else 0.0
     alone, alone_evidence = replace(learn, promising=promising).grown(bare)
-    return chosen(grown, alone, alone_evidence - gain, named, explains)
+    return chosen(grown, alone, alone_evidence - gain, last)
 
 
 def chosen(
-    grown: tuple[SearchRound, ...],
-    alone: tuple[SearchRound, ...],
-    lead: float,
-    named: Sequence[Effect],
-    explains: Sequence[str],
+    grown: tuple[SearchRound, ...], alone: tuple[SearchRound, ...], lead: float, named: SearchRound
 ) -> tuple[SearchRound, ...]:
-    """The rounds with the named effects, or those of increments alone where these lead by far; the others are a rival.
+    """The rounds with the named effects, or those of increments alone where these lead by far; the others keep their weight.
 
     Increments alone with less evidence are no rival of names that need no increment beside them and act on the same
     coefficients and channels, because a curve can imitate any name there.
@@ -139,17 +106,26 @@ def chosen(
     ----------
     grown, alone : rounds with names, and increments beside them where those were learned, and rounds of increments alone.
     lead : log evidence of the second over the first [-].
-    named, explains : the named effects, and the names that explain released derivatives.
+    named : last round of the names alone.
     """
     learned = tuple(c.score.effect for c in _accepted(alone))
-    if len(alone) > 1 and lead > _NAMES_LEAD:
-        names = tuple(sorted({*(e.label for e in named), *explains}))
-        return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
-    if learned and (lead > _AS_GOOD or _accepted(grown) or _acts_on(learned) != _acts_on(named)):
-        sets = {} if grown[0].rival is None else dict(grown[0].rival.sets)
-        rival = Rival({**sets, tuple(sorted({e.name for e in learned})): lead})
-        return (replace(grown[0], rival=rival), *grown[1:])
+    if not learned:
+        return grown
+    increments = (NAME,)
+    if lead > _NAMES_LEAD:
+        return (*alone[:-1], replace(alone[-1], posterior=_weighed({named.names: -lead, increments: 0.0})))
+    if lead > _AS_GOOD or _accepted(grown) or _acts_on(learned) != _acts_on(named.null.hypothesis.effects):
+        end = grown[-1]
+        own = end.posterior.get(end.names, 1.0)
+        total = {**end.posterior, increments: own * float(np.exp(min(lead, 0.0)))}
+        return (*grown[:-1], replace(end, posterior=shares(total)))
     return grown
+
+
+def _weighed(logs: Mapping[tuple[str, ...], float]) -> dict[tuple[str, ...], float]:
+    """Probabilities of sets by the logarithms of their weights."""
+    top = max(logs.values())
+    return shares({names: float(np.exp(log - top)) for names, log in logs.items()})
 
 
 def _acts_on(effects: Sequence[Effect]) -> set[str]:
@@ -197,43 +173,19 @@ class _Learning:
             rounds = (*rounds[:-1], replace(last, candidates=(*last.candidates, *candidates), tied=tied))
             if not tied:
                 break
-            rounds = self._replacing(rounds, _weight(tried)) or rounds
-            following = self._following(rounds, rounds[-1].tied[0].fit)
-            if following is None:
-                break
-            rounds = (*rounds, following)
+            rounds = (*rounds, self._following(rounds, rounds[-1].tied[0].fit))
         return rounds, sum(0.5 * c.gain for c in _accepted(rounds))
 
-    def _replacing(self, rounds: tuple[SearchRound, ...], tried: float) -> tuple[SearchRound, ...] | None:
-        """The rounds with the last increment in place of an earlier one that it makes redundant."""
-        best = rounds[-1].tied[0].fit
-        new, old = best.hypothesis.effects[-1], redundant_increment(self.sets, best, tried)
-        if old is None or not isinstance(new, Increment):
-            return None
-        if not may_begin(self.advance, f"{new.key} instead of {old.key}"):
-            return None
-        index = next(i for i, r in enumerate(rounds) if r.tied and r.tied[0].score.effect.key == old.key)
-        own = rounds[index]
-        sizes = np.concatenate([own.null.point.sizes, best.point.sizes[best.hypothesis.span(new.key)]])
-        alone = self.sets.fit(own.null.hypothesis.plus(new), replace(own.null.point, sizes=sizes))
-        if alone is None:
-            return None
-        evidence = log_evidence(own.null, alone, new, tried)
-        reference = reference_of(self.sets.problem, own.null)
-        leader = assessed(self.sets.problem, FittedIncrement(new, alone, evidence), reference)
-        if leader.reasons:
-            return None
-        others = (
-            replace(c, reasons=(Refusal.SUPERSEDED,)) if c.score.effect.key == old.key else c
-            for c in own.candidates
-        )
-        return (*rounds[:index], replace(own, candidates=(*others, leader), tied=(leader,)))
-
-    def _following(self, rounds: tuple[SearchRound, ...], fitted: PosteriorFit) -> SearchRound | None:
+    def _following(self, rounds: tuple[SearchRound, ...], fitted: PosteriorFit) -> SearchRound:
         """The round whose null has the increment; its candidates are scored and none is refitted."""
-        own = scored_round(self.sets, fitted, self.effects, len(rounds), self.seed, self.advance)
-        last = rounds[-1]
-        return None if own is None else replace(own, sets=last.sets, release=last.release)
+        self.advance("score the effects")
+        own, last = scored(self.sets.problem, fitted, self.effects, self.seed), rounds[-1]
+        beside = float(expit(0.5 * last.tied[0].gain))
+        posterior: dict[tuple[str, ...], float] = {}
+        for names, weight in (last.posterior or {(): 1.0}).items():
+            for added, share in ((names, 1.0 - beside), (tuple(sorted({*names, NAME})), beside)):
+                posterior[added] = posterior.get(added, 0.0) + weight * share
+        return replace(own, explanation=last.explanation, posterior=posterior)
 
     def _candidates(
         self, null: PosteriorFit, last: SearchRound, every: Sequence[Shape], evident: float
@@ -261,7 +213,8 @@ class _Learning:
         for own in ranked:
             accepted = next((c for c in found if not c.reasons), None)
             if accepted is not None and 2.0 * own.log_evidence < accepted.gain - TIE:
-                found.append(untested(evidence_score(own), own.fit, 2.0 * own.log_evidence, Refusal.OUTDONE))
+                refused = (Refusal.OUTDONE,)
+                found.append(Candidate(evidence_score(own), own.fit, 2.0 * own.log_evidence, refused))
             else:
                 found.append(assessed(self.sets.problem, own, reference))
         return tuple(found)

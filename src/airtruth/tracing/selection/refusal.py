@@ -10,11 +10,6 @@ class Refusal(StrEnum):
 
     UNCONVERGED = "its refit did not converge"
     OUTDONE = "another effect explains more"
-    SUPERSEDED = "it explains nothing beside another effect"
-    SURPASSED = "a set of effects without it explains more"
-    UNSUPPORTED = "no test of the declared aircraft is significant over all tests"
-    INSIGNIFICANT = "after its refit it explains nothing significant"
-    UNCERTAIN = "after its refit its size is no larger than its uncertainty"
     IMMATERIAL = "its size is immaterial"
     WORSE_LIKELIHOOD = "it worsens the likelihood of records left out"
     WORSE_FREE_RUN = "it worsens the free run of records left out"

@@ -63,6 +63,11 @@ class Score:
     information: float
     index: int
 
+    @classmethod
+    def none(cls, effect: Effect) -> Score:
+        """The score of an effect that cannot be tested at a null."""
+        return cls(effect, 0.0, 1.0, 0.0, Direction(effect, (), effect.parameters[0].step), 0.0, -1)
+
 
 @dataclass(frozen=True)
 class ScoreTable:

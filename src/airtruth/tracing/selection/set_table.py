@@ -1,8 +1,8 @@
 """The fits of a search, each set of effects once.
 
-Several steps of a search ask for the same set: as the null of a round, as an exchange, as what remains without an effect. The
-table holds the best fit of each set, and answers such a question without another refit. A likelihood may have several optima,
-so that a set can also be fitted from a start that is not the table's own; the best fit remains, whatever the start.
+Several steps of a search ask for the same set. The table holds the best fit of each set, and answers such a question without
+another refit. A likelihood may have several optima, so that a set can also be fitted from a start that is not the table's own;
+the best fit remains, whatever the start.
 """
 
 from __future__ import annotations
@@ -43,17 +43,6 @@ class SetKey(NamedTuple):
     spread: bytes
 
 
-class _Entry(NamedTuple):
-    """A fit, and the cost of the rival against which it was made."""
-
-    fit: PosteriorFit
-    rival: float
-
-    def answers(self, rival: float) -> bool:
-        """Whether another fit would end as this one: it converged, or ended out of reach of this rival too."""
-        return self.fit.converged if not self.fit.outrun else rival <= self.rival
-
-
 class SetTable:
     """Fits of one problem by their set of effects.
 
@@ -64,39 +53,24 @@ class SetTable:
 
     def __init__(self, problem: TraceProblem) -> None:
         self.problem = problem
-        self._best: dict[SetKey, _Entry] = {}
-        self._tried: dict[tuple[SetKey, bytes], float] = {}
-        self._exchanges: dict[SetKey, list[SetKey]] = {}
+        self._best: dict[SetKey, PosteriorFit] = {}
+        self._tried: set[tuple[SetKey, bytes]] = set()
 
     def fit(
-        self,
-        hypothesis: Hypothesis,
-        start: Parameters,
-        *,
-        rival: float = np.inf,
-        only_better: bool = False,
-        near: PosteriorFit | None = None,
+        self, hypothesis: Hypothesis, start: Parameters, *, near: PosteriorFit | None = None
     ) -> PosteriorFit | None:
-        """The best fit of a set, made only where the table holds none; one that did not end begins where it stopped.
+        """The best fit of a set, made only where the table holds none; one that did not converge begins where it stopped.
 
         Parameters and None as of `airtruth.tracing.inference.optimise.fit`.
         """
         known = self._best.get(key_of(hypothesis))
         if known is None:
-            return self.fit_from(hypothesis, start, rival=rival, only_better=only_better, near=near)
-        own = in_order_of(known.fit, hypothesis)
-        if known.answers(rival):
-            return own
-        return self.fit_from(hypothesis, own.point, rival=rival, only_better=only_better, near=own)
+            return self.fit_from(hypothesis, start, near=near)
+        own = in_order_of(known, hypothesis)
+        return own if known.converged else self.fit_from(hypothesis, own.point, near=own)
 
     def fit_from(
-        self,
-        hypothesis: Hypothesis,
-        start: Parameters,
-        *,
-        rival: float = np.inf,
-        only_better: bool = False,
-        near: PosteriorFit | None = None,
+        self, hypothesis: Hypothesis, start: Parameters, *, near: PosteriorFit | None = None
     ) -> PosteriorFit | None:
         """The fit of a set from a start, which may lead to another optimum; the table keeps the better.
 
@@ -106,100 +80,45 @@ class SetTable:
         key = key_of(hypothesis)
         begin = key, _in_order(start, hypothesis, sorted(hypothesis.effects, key=_name)).vector.tobytes()
         known = self._best.get(key)
-        if known is not None and known.fit.converged and rival <= self._tried.get(begin, -np.inf):
-            return in_order_of(known.fit, hypothesis)
-        own = fit(self.problem, hypothesis, start, rival=rival, only_better=only_better, near=near)
+        if known is not None and known.converged and begin in self._tried:
+            return in_order_of(known, hypothesis)
+        own = fit(self.problem, hypothesis, start, near=near)
         if own is not None:
-            self._tried[begin] = rival
-            if not (own.outrun and only_better):  # of no use to anyone
-                self.keep(own, rival)
+            self._tried.add(begin)
+            self.keep(own)
         return own
 
     def fit_from_declared(
-        self,
-        hypothesis: Hypothesis,
-        sizes: Array,
-        null: PosteriorFit,
-        *,
-        rival: float = np.inf,
-        only_better: bool = False,
+        self, hypothesis: Hypothesis, sizes: Array, null: PosteriorFit
     ) -> PosteriorFit | None:
         """`fit_from` the declared aircraft, and not from a null, which may have absorbed an effect.
 
-        It begins with the levels of noise and gusts of the null: from strong gusts these would fall for many steps far behind a
-        rival, and the search would be given up.
+        It begins with the levels of noise and gusts of the null: strong gusts would fall for many steps.
 
         Parameters
         ----------
         sizes : of the effects, at which the search begins; null : a fit whose derivatives the first steps use.
         """
         start = initial_parameters(self.problem, hypothesis, sizes, _FIRST_ITERATIONS).with_levels(null.point)
-        return self.fit_from(hypothesis, start, rival=rival, only_better=only_better, near=null)
-
-    def declared(self, last: PosteriorFit) -> PosteriorFit | None:
-        """The fit of the same effects under the declaration: released derivatives absorb what a wrong effect leaves."""
-        if last.hypothesis.spread is None:
-            return last
-        return self.fit(replace(last.hypothesis, spread=None), last.point, near=last)
-
-    def best_from(
-        self,
-        hypothesis: Hypothesis,
-        starts: Sequence[Parameters],
-        *,
-        rival: float = np.inf,
-        near: PosteriorFit | None = None,
-    ) -> PosteriorFit | None:
-        """The fit of a set that the table holds complete, else the best one from several starts; options as of `fit`."""
-        known = self.best(hypothesis)
-        if known is None:
-            for start in starts:
-                self.fit_from(hypothesis, start, rival=rival, near=near)
-            if starts:
-                known = self.converged(hypothesis, starts[0], rival=rival, near=near)
-        return known
+        return self.fit_from(hypothesis, start, near=null)
 
     def converged(
-        self,
-        hypothesis: Hypothesis,
-        start: Parameters,
-        *,
-        rival: float = np.inf,
-        near: PosteriorFit | None = None,
+        self, hypothesis: Hypothesis, start: Parameters, *, near: PosteriorFit | None = None
     ) -> PosteriorFit | None:
         """`fit`, continued until it converges or `_ATTEMPTS` are spent."""
         own = None
         for _ in range(_ATTEMPTS):
-            own = self.fit(hypothesis, start, rival=rival, near=near)
+            own = self.fit(hypothesis, start, near=near)
             if own is None or own.converged:
                 break
         return own
 
-    def keep(self, fitted: PosteriorFit, rival: float = np.inf) -> None:
-        """Enter a fit that was made elsewhere, where the table holds no better one.
-
-        A fit that ended early counts only where none is complete, because its derivatives are those of a point before it.
-        """
+    def keep(self, fitted: PosteriorFit) -> None:
+        """Enter a fit that was made elsewhere, where the table holds no better one."""
         key = key_of(fitted.hypothesis)
         known = self._best.get(key)
-        if known is None or (fitted.outrun, fitted.cost) < (known.fit.outrun, known.fit.cost):
-            self._best[key] = _Entry(fitted, rival)
-
-    def best(self, hypothesis: Hypothesis) -> PosteriorFit | None:
-        """The fit of a set that ended at an optimum; None where the table holds none."""
-        known = self._best.get(key_of(hypothesis))
-        if known is None or known.fit.outrun or not known.fit.converged:
-            return None
-        return in_order_of(known.fit, hypothesis)
-
-    def exchange(self, last: PosteriorFit, tried: PosteriorFit) -> None:
-        """Enter that a set has been tried in place of another."""
-        self._exchanges.setdefault(key_of(last.hypothesis), []).append(key_of(tried.hypothesis))
-
-    def exchanges(self, last: PosteriorFit) -> tuple[PosteriorFit, ...]:
-        """The fits of the sets that have been tried in place of another."""
-        keys = dict.fromkeys(self._exchanges.get(key_of(last.hypothesis), ()))
-        return tuple(self._best[key].fit for key in keys)
+        if known is None or fitted.cost < known.cost:
+            self._best[key] = fitted
 
 
 def key_of(hypothesis: Hypothesis) -> SetKey:

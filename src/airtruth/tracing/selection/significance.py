@@ -18,21 +18,12 @@ LEVEL: Final = 0.05
 REMAINS: Final = 0.01
 """Probability of the remaining anomaly below which effects without a score are refitted and increments learned [-]; that of an
 unexplained verdict."""
-BEYOND_DOUBT: Final = 1e-6
-"""Probability of an anomaly below which a model is misspecified whatever the next effect explains [-] (judgement)."""
-LATER_LEVEL: Final = 0.005
-"""Significance level of the scores in later rounds [-] (judgement: a tenth of that of the first)."""
-MISFIT_LEVEL: Final = 0.001
-"""Significance level of the scores beside an anomaly beyond doubt [-] (judgement: a misspecified model always leaves a small
-residual, and a stricter level adds fewer false effects at the price of small true ones)."""
+CONTRADICTED: Final = 0.01
+"""Probability below which records contradict the declared derivatives [-] (convention: one true declaration in a
+hundred is contradicted)."""
 FAMILY_LEVEL: Final = 0.05165827451
 """Significance level of the gain in 2 log L of a refit over all candidates, by Bonferroni's rule [-]: a gain of 10.0
 where 33 candidates are tested, 10.1 for the 35 of the library (judgement: a round figure next to 5 %)."""
-LATER_FAMILY_LEVEL: Final = 2.090301960986e-3
-"""Level of that gain in later rounds [-]: a gain of 16.0 for 33 candidates (judgement: beside three true effects, the best false
-one gains less than 16 in 77 of 78 triples, those for which the limit was chosen; seven true ones gain 16 to 25)."""
-MISFIT_FAMILY_LEVEL: Final = 1.8919003744e-5
-"""Level of that gain beside an anomaly beyond doubt [-]: a gain of 25.0 for 33 candidates (judgement: as `MISFIT_LEVEL`)."""
 
 
 def significant_gain(candidates: int, level: float = FAMILY_LEVEL) -> float:
@@ -45,12 +36,6 @@ def significant_gain(candidates: int, level: float = FAMILY_LEVEL) -> float:
     level : significance level over all candidates [-].
     """
     return float(chi2.isf(level / max(candidates, 1), 1))
-
-
-def later_gain(candidates: int, anomaly: HypothesisTest) -> float:
-    """Gain in 2 log L from which an effect is significant beside others that leave an anomaly."""
-    misfit = anomaly.p_value < BEYOND_DOUBT
-    return significant_gain(candidates, MISFIT_FAMILY_LEVEL if misfit else LATER_FAMILY_LEVEL)
 
 
 def strongest(
@@ -72,4 +57,4 @@ def strongest(
     return replace(least, p_value=min(1.0, len(seen) * least.p_value))
 
 
-__all__ = ["later_gain", "significant_gain", "strongest"]
+__all__ = ["significant_gain", "strongest"]

@@ -1,4 +1,4 @@
-"""The tests that a refitted effect has to pass: significant, material, and no worse on records left out."""
+"""The tests that a fitted set has to pass whatever its evidence: plausible sizes, and no worse on records left out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.effects.effect import Effect
@@ -18,15 +17,12 @@ from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
+from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.model.plant import alpha_dot
 from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.score_test import Score
 
 Array = NDArray[np.float64]
 
-IMPROBABLE: Final = 0.001
-"""Probability below which refitted derivatives contradict the declared ones [-] (convention: three standard errors)."""
 _SLIGHT: Final = 0.25
 """Overshoot allowed to an effect that cancels a declared term, as a fraction of that term [-] (judgement: a flight tells a
 term in alpha_dot to about that)."""
@@ -47,30 +43,6 @@ _SEVERAL: Final = 3
 """Number of records from which the scatter between records is estimated [-]; with fewer none may get worse."""
 _AT_END: Final = 1e-6
 """Distance from an end of the range, over the range, at which a size has ended there [-] (judgement: above rounding)."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A refitted effect.
-
-    Attributes
-    ----------
-    score, fit : its score, and the fit with all parameters free.
-    gain : gain in 2 log L over the null with equally free derivatives, less 2 for each parameter beyond the first.
-    likelihood_gain, free_run_gain : (records,) gains on records left out, in log L and in squared residual over the
-        share that gusts and sensors explain; NaN where they were not computed.
-    size, std : estimate of the first parameter in its size coordinate.
-    reasons : tests that it fails, in words; empty if it is accepted.
-    """
-
-    score: Score
-    fit: PosteriorFit
-    gain: float
-    likelihood_gain: Array
-    free_run_gain: Array
-    size: float
-    std: float
-    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -106,46 +78,14 @@ def _ways(problem: TraceProblem) -> tuple[Callable[[TraceProblem, PosteriorFit],
     return (leave_one_out, one_by_the_other) if len(problem.records) == 2 else (leave_one_out,)
 
 
-def untested(s: Score, own: PosteriorFit, gain: float, *reasons: str) -> Candidate:
-    """A candidate that is rejected without tests, and why."""
-    nothing = np.full(len(own.likelihood), np.nan)
-    return Candidate(s, own, gain, nothing, nothing, *_size(s, own), reasons)
-
-
-def assess_candidate(
-    problem: TraceProblem, s: Score, own: PosteriorFit, gain: float, reference: Reference, least: float
-) -> Candidate:
-    """Test a refitted effect.
-
-    Parameters
-    ----------
-    s, own, gain : its score, its fit, and its gain in 2 log L.
-    reference : the fit without it.
-    least : gain in 2 log L that is significant for white innovations; for correlated ones it is multiplied by the
-        ratio of robust to plain variance (J. T. Kent, Biometrika 69 (1982)); the robust one is unbiased with fewer than three
-        records, whose scatter is not estimated.
-    """
-    size, std = _size(s, own)
-    few = len(problem.records) < _SEVERAL
-    excess = float(inflation(problem, own, unbiased=few)[own.layout.size(_first_size(s, own))])
-    left_out = tested_on_left_out(problem, own, reference, gain)
-    reasons = [
-        *_fit_reasons(s, own, gain, least, excess),
-        *left_out.reasons,
-        *implausibility(problem, s.effect, own),
-    ]
-    return Candidate(
-        s, own, gain, left_out.likelihood_gain, left_out.free_run_gain, size, std, tuple(reasons)
-    )
-
-
 @dataclass(frozen=True)
 class LeftOutTest:
     """A fit against its reference, on records left out.
 
     Attributes
     ----------
-    likelihood_gain, free_run_gain : (records,) as of `Candidate`.
+    likelihood_gain, free_run_gain : (records,) gains in log L, and in squared residual over the share that gusts and sensors
+        explain [-].
     reasons : what gets worse, in words.
     """
 
@@ -213,16 +153,6 @@ def loses_in_two_channels(gains: Array, covariance: Array) -> bool:
         if max(first, second) < 0.0 and first + second < -2.0 * _ERRORS * np.sqrt(1.0 + correlation):
             return True
     return False
-
-
-def _fit_reasons(s: Score, own: PosteriorFit, gain: float, least: float, excess: float) -> Iterator[str]:
-    size, std = _size(s, own)
-    if not has_converged(own, gain):
-        yield Refusal.UNCONVERGED
-    if gain < least * excess**2:
-        yield Refusal.INSIGNIFICANT
-    if not s.effect.parameters[0].one_sided and abs(size) < _ERRORS * std * excess:
-        yield Refusal.UNCERTAIN
 
 
 def implausibility(problem: TraceProblem, effect: Effect, own: PosteriorFit) -> Iterator[str]:
@@ -313,40 +243,6 @@ def has_converged(own: PosteriorFit, gain: float) -> bool:
     return own.converged or 2.0 * own.shortfall < _SMALL_SHORTFALL * gain
 
 
-def declared_probability(problem: TraceProblem, own: PosteriorFit) -> float:
-    """Probability that refitted derivatives lie as far from the declared ones, by the declared uncertainty alone.
-
-    Source: G. E. P. Box, J. R. Statist. Soc. A 143 (1980), the prior predictive check. The mode is nearer to the
-    prior than the maximum of the likelihood, so the check is conservative.
-    """
-    off = own.point.common[own.point.of.common.derivatives]
-    tight = [i for i in range(off.size) if i not in own.hypothesis.unconstrained]
-    covariance = problem.declared_covariance[np.ix_(tight, tight)]
-    return float(chi2.sf(float(off[tight] @ np.linalg.solve(covariance, off[tight])), len(tight)))
-
-
-def own_probability(problem: TraceProblem, own: PosteriorFit) -> float:
-    """Probability that biases and trim coefficients lie as far from the declared ones, as `declared_probability`."""
-    total, count = 0.0, 0
-    for (middle, precision), local in zip(
-        problem.priors(own.hypothesis).per_record, own.point.per_record, strict=True
-    ):
-        off = (local - middle)[own.point.of.per_record.offsets]
-        total += float(off**2 @ np.diag(precision)[own.point.of.per_record.offsets])
-        count += off.size
-    return float(chi2.sf(total, count))
-
-
-def _size(s: Score, own: PosteriorFit) -> tuple[float, float]:
-    at = _first_size(s, own)
-    return float(own.point.sizes[at]), own.size_std(at)
-
-
-def _first_size(s: Score, own: PosteriorFit) -> int:
-    """Index of the effect's first parameter among the sizes."""
-    return len(own.point.sizes) - len(s.effect.parameters)
-
-
 def _is_loss(gains: Array) -> bool:
     """Whether the sum of the gains is negative by more than two of its own standard errors.
 
@@ -362,3 +258,14 @@ def _is_loss(gains: Array) -> bool:
         return bool(gains.min() < 0.0)
     error = float(gains.std(ddof=1) * np.sqrt(gains.size))
     return float(gains.sum()) < -_ERRORS * error
+
+
+__all__ = [
+    "Reference",
+    "has_converged",
+    "implausibility",
+    "is_plausible",
+    "predicts_records_left_out",
+    "reference_of",
+    "tested_on_left_out",
+]
