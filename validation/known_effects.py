@@ -33,7 +33,7 @@ from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
-from airtruth.tracing.selection.rounds import RoundStart, search_round
+from airtruth.tracing.selection.rounds import scored
 from airtruth.tracing.selection.set_table import SetTable
 from validation.blind.figures import DECLARED
 
@@ -110,10 +110,10 @@ def _fitted(case: Case, hypothesis: Hypothesis, true: Array, trial: dict[str, An
         raise AirtruthError(f"{name}: the motion is lost at the true sizes")
     case = with_corner_share(replace(case, fitted=problem, hypothesis=hypothesis), best.point)
     others = tuple(e for e in case.effects if e not in hypothesis.effects)
-    scored = RoundStart(hypothesis, best.point, others, scores_only=True)
-    found = search_round(SetTable(case.fitted), scored, 1, 0, lambda step: None)
-    if found is None:
+    refitted = SetTable(case.fitted).fit(hypothesis, best.point)
+    if refitted is None:
         raise AirtruthError(f"{name}: the motion is lost at the fitted sizes")
+    found = scored(case.fitted, refitted, others, 0)
     fit = found.null
     keys = [f"{e.key}.{p.name}" for e in hypothesis.effects for p in e.parameters]
     z = {

@@ -1,19 +1,19 @@
-"""Sets of causes of shifted derivatives: evidence, sizes and ranking, against independent values."""
+"""Which of several sets of effects an answer states, and causes of shifted derivatives in a quadratic of these alone."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from hypothesis import given
+from hypothesis import strategies as st
 
-from airtruth.effects.effect import Prior
+from airtruth.effects.registry import EFFECTS
 from airtruth.physics.composition import TailGeometry, directions
 from airtruth.physics.motion import LATERAL
-from airtruth.tracing.inference.causes import Cause, causes_of
-from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
-from airtruth.tracing.selection.explanation import CauseSet, explain, least_cost, simplest_first, size_of
-from airtruth.tracing.selection.release import DeclaredCauses, explained
+from airtruth.tracing.inference.causes import causes_of
+from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, size_along
+from airtruth.tracing.selection.evidence import EffectColumn, Quadratic
+from airtruth.tracing.selection.explanation import Explanation, events, shares, simplest
 
 DECLARED = np.array([4.787, 31.7, 0.480, -1.785, -41.2, -1.787])
 """Derivatives of aircraft/gtm."""
@@ -24,164 +24,127 @@ TOLD = np.abs(DECLARED) * np.array([0.004, 0.05, 0.01, 0.004, 0.01, 0.004])
 DIRECTIONS = directions(DECLARED, TailGeometry(7.9))
 
 
-def likelihood(shift, told=TOLD):
-    information = np.diag(told**-2.0)
-    return DerivativeLikelihood(
-        information, information @ shift, 0.5 * float(shift @ information @ shift), np.diag(STD**2)
+def quadratic(shift, causes, told=TOLD, std=STD, wrong_allowed=True):
+    """The log-likelihood of increments whose estimate is a shift, with causes that move them."""
+    along = np.column_stack([np.eye(len(shift)), *(c.direction for c in causes)])
+    information = along.T @ np.diag(told**-2.0) @ along
+    slope = -along.T @ (shift / told**2)
+    offset = 0.5 * float((shift / told) @ (shift / told))
+    columns = tuple(EffectColumn(cause=c) for c in causes)
+    return Quadratic(
+        offset, slope, information, np.diag(std**2), len(shift), columns, wrong_allowed=wrong_allowed
     )
 
 
-@pytest.mark.slow
+def best(q, most=3):
+    return max(q.sets(most), key=lambda w: w.log_evidence)
+
+
 @pytest.mark.parametrize(
-    ("shift", "effects"),
+    ("shift", "names"),
     [
         (-0.5 * DIRECTIONS["tail"], ("tail_effectiveness",)),
         (-0.4 * DIRECTIONS["elevator"], ("elevator_effectiveness",)),
         (0.08 * DIRECTIONS["cg"], ("cg_shift",)),
         (2.5 * DIRECTIONS["icing"], ("icing",)),
         (DECLARED * [0.4, 0.0, -0.5, 0.4, -0.9, 0.0], ("derivatives",)),
+        (0.3 * STD, ()),
     ],
 )
-def test_the_cause_of_a_shift_leads(shift, effects):
-    """Far beyond the declared uncertainty, with shapes as in the library."""
-    assert explain(likelihood(shift), causes_of(DIRECTIONS))[0].effects == effects
-
-
-def test_declared_derivatives_lead_where_nothing_is_wrong():
-    """Beside the constant that makes a single cause comparable with the refit of an effect."""
-    none, *others = sorted(
-        explain(likelihood(0.3 * STD), causes_of(DIRECTIONS)), key=lambda s: bool(s.effects)
-    )
-    assert none.effects == ()
-    assert all(s.cost + 4.0 > none.cost for s in others)
-
-
-def test_the_evidence_is_that_of_a_normal_prior():
-    """Two sets compared: the ratio of the densities of the estimate under both, by scipy's normal."""
-    shift = np.array([0.1, 3.0, -0.05, 0.25, 4.0, 0.1])
-    cause = Cause("cg_shift", DIRECTIONS["cg"], Prior(0.05, -np.inf, np.inf, shape=0.0))
-    by_effects = {s.effects: s for s in explain(likelihood(shift), [cause], wrong_allowed=False)}
-    about = np.diag(STD**2 + TOLD**2)
-    wide = about + 0.05**2 * np.outer(cause.direction, cause.direction)
-    densities = [multivariate_normal(np.zeros(6), c).logpdf(shift) for c in (about, wide)]
-    odds = cause.prior.log_odds + 4.0  # the prior odds, and the constant that makes it comparable with refits
-    expected = densities[0] - densities[1] - odds
-    assert by_effects[("cg_shift",)].cost - by_effects[()].cost == pytest.approx(expected, rel=1e-9)
+def test_the_cause_of_a_shift_leads(shift, names):
+    """Far beyond the declared uncertainty, with shapes as in the library; none within it."""
+    q = quadratic(shift, causes_of(DIRECTIONS))
+    assert q.names(best(q)) == names
 
 
 def test_the_size_is_that_of_weighted_least_squares():
     shift = 0.03 * DIRECTIONS["cg"] + 0.5 * STD
     v, weight = DIRECTIONS["cg"], 1.0 / (STD**2 + TOLD**2)
-    size, std = size_of(likelihood(shift), Cause("cg_shift", v, Prior(0.05, -0.15, 0.15)))
-    assert size == pytest.approx((v * weight * shift).sum() / (v * weight * v).sum(), rel=1e-9)
-    assert std == pytest.approx((v * weight * v).sum() ** -0.5, rel=1e-9)
-
-
-def test_derivatives_without_information_do_not_matter():
-    """A derivative that the records do not show changes no cost but by its prior odds, 1 in e."""
-    told = TOLD.copy()
-    told[1] = 1e6
-    shift = 0.08 * DIRECTIONS["cg"]
-    sets = {(s.causes, s.wrong): s.cost for s in explain(likelihood(shift, told), causes_of(DIRECTIONS))}
-    alone, with_q = sets[(), ("Cmalpha",)], sets[(), ("CLq", "Cmalpha")]
-    assert with_q - alone == pytest.approx(1.0, abs=1e-6)
+    information = np.diag(TOLD**-2.0)
+    likelihood = DerivativeLikelihood(information, information @ shift, 0.0, np.diag(STD**2))
+    expected = (v * weight * shift).sum() / (v * weight * v).sum(), (v * weight * v).sum() ** -0.5
+    assert size_along(likelihood, v) == pytest.approx(expected, rel=1e-9)
+    assert size_along(replace(likelihood, information=np.zeros((6, 6))), v) == (0.0, np.inf)
+    causes = [
+        replace(c, prior=replace(c.prior, shape=0.0)) for c in causes_of(DIRECTIONS) if c.key == "cg_shift"
+    ]
+    q = quadratic(shift, causes)
+    only = next(w for w in q.sets(1) if w.columns and not w.declaration.wrong)
+    sizes, std = q.alone(only)
+    assert (sizes[0], std[0]) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_size_beyond_its_range_is_improbable():
     """A tail that becomes more effective, of a sign that is not physical."""
-    shift = 0.5 * DIRECTIONS["tail"]
-    tail = [c for c in causes_of(DIRECTIONS) if c.key == "tail_effectiveness"]
-    costs = [
-        {s.effects: s.cost for s in explain(likelihood(shift), causes)}[("tail_effectiveness",)]
-        for causes in (tail, [replace(tail[0], prior=replace(tail[0].prior, low=-np.inf, high=np.inf))])
-    ]
-    assert costs[0] > costs[1] + 5.0
+    tail = next(c for c in causes_of(DIRECTIONS) if c.key == "tail_effectiveness")
+    free = replace(tail, prior=replace(tail.prior, low=-np.inf, high=np.inf))
+    logs = []
+    for cause in (tail, free):
+        q = quadratic(0.5 * DIRECTIONS["tail"], [cause])
+        logs.append(max(w.log_evidence for w in q.sets(1) if w.columns and not w.declaration.wrong))
+    assert logs[0] < logs[1] - 5.0
 
 
-def cause_set(cost, *causes, wrong=()):
-    return CauseSet(causes, wrong, (), (), np.zeros((6, 6)), cost)
-
-
-def test_the_weight_of_wrong_declarations_is_the_sum_over_their_sets():
-    """Four sets that are each e^-1 as probable as the best one: 4/e = 1.47 of its weight, so that they lead."""
-    best = cause_set(0.0, "mass_error", "inertia_error")
-    wrong = [
-        cause_set(1.0 + 0.01 * k, wrong=(name,)) for k, name in enumerate(("CLalpha", "CLq", "Cmq", "Cmde"))
-    ]
-    first, *rest = simplest_first((best, *wrong))
-    assert first is wrong[0]
-    assert rest == [best, *wrong[1:]]
-    assert least_cost((first, *rest)) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("cost", "names"), [(2.30, ("cg_shift",)), (2.31, ("cg_shift", "tail_effectiveness"))]
-)
-def test_fewer_effects_lead_unless_the_odds_against_them_are_strong(cost, names):
-    """exp(-cost) is a tenth at ln 10 = 2.3026."""
-    sets = (cause_set(0.0, "cg_shift", "tail_effectiveness"), cause_set(cost, "cg_shift"))
-    assert simplest_first(sets)[0].causes == names
-
-
-@pytest.mark.parametrize(("cost", "names"), [(0.69, ("cg_shift",)), (0.70, ("cg_shift", "inertia_error"))])
-def test_a_further_cause_of_a_changed_loading_needs_odds_of_two(cost, names):
-    """exp(-cost) is a half at ln 2 = 0.6931; mass, CG and inertia are one event."""
-    sets = (
-        cause_set(0.0, "cg_shift", "inertia_error"),
-        cause_set(cost, "cg_shift"),
-        cause_set(2.0, "cg_shift", "tail_effectiveness"),
-    )
-    assert simplest_first(sets)[0].causes == names
-
-
-def test_no_set_has_no_order():
-    assert simplest_first(()) == ()
-
-
-def test_a_set_without_a_cause_keeps_the_sizes_of_the_others():
-    whole = CauseSet(("mass_error", "cg_shift"), ("Cmq",), (0.1, 0.02), (0.01, 0.005), np.eye(6), 3.0)
-    less = whole.without({"mass_error", "inertia_error"})
-    assert (less.causes, less.sizes, less.size_std) == (("cg_shift",), (0.02,), (0.005,))
-    assert less.effects == ("cg_shift", "derivatives")
-    assert (less.wrong, less.cost) == (whole.wrong, whole.cost)
-
-
-@pytest.mark.slow
-def test_what_a_refit_shows_beyond_first_order_is_kept(monkeypatch):
-    """Also beside other effects, where the sets are explained again; sets of other causes and wrong declarations keep theirs."""
-    monkeypatch.setattr(
-        "airtruth.tracing.selection.release.derivative_likelihood",
-        lambda problem, free: likelihood(-0.3 * DIRECTIONS["tail"]),
-    )
-    free = SimpleNamespace(hypothesis=SimpleNamespace(effects=()))
-    plain = explained(None, free, DeclaredCauses(causes_of(DIRECTIONS)))
-    kept = explained(None, free, DeclaredCauses(causes_of(DIRECTIONS), corrections={("cg_shift",): -200.0}))
-    costs = [{(s.effects, s.wrong): s.cost for s in sets} for sets in (plain, kept)]
-    assert kept[0].effects == ("cg_shift",) != plain[0].effects
-    changed = {key for key in costs[0] if costs[1][key] != costs[0][key]}
-    assert changed == {(("cg_shift",), ())}
-    assert costs[1][("cg_shift",), ()] == pytest.approx(costs[0][("cg_shift",), ()] - 200.0)
-
-
-def test_wrong_declarations_of_a_motion_with_many_derivatives_are_found_one_by_one():
+def test_wrong_declarations_of_a_motion_with_many_derivatives_are_compared_one_by_one():
     """All 32768 sets of fifteen derivatives would take minutes; two that are wrong lead, beside none that is right."""
     declared = np.array(
         [-1.0, 0.06, 0.86, -0.02, 0.34, -0.14, -0.34, 0.15, -0.072, 0.027, 0.22, -0.05, -0.39, -0.003, -0.17]
     )
     std = np.maximum(0.05 * np.abs(declared), 0.002)
-    told = 0.1 * std
-    shift = np.zeros(15)
-    wrong = [LATERAL.index("Clp"), LATERAL.index("Cndr")]
+    shift, wrong = np.zeros(15), [LATERAL.index("Clp"), LATERAL.index("Cndr")]
     shift[wrong] = 8.0 * std[wrong]
-    information = np.diag(told**-2.0)
-    lateral = DerivativeLikelihood(
-        information,
-        information @ shift,
-        0.5 * float(shift @ information @ shift),
-        np.diag(std**2),
-        LATERAL,
-    )
     causes = causes_of(directions(declared, TailGeometry(7.9), LATERAL))
-    best = explain(lateral, causes)[0]
-    assert (best.causes, best.wrong) == ((), ("Clp", "Cndr"))
-    assert not explain(lateral, causes, wrong_allowed=False)[0].wrong
+    leading = best(quadratic(shift, causes, 0.1 * std, std), 1)
+    assert (leading.columns, leading.declaration.wrong) == ((), tuple(wrong))
+    assert not best(quadratic(shift, causes, 0.1 * std, std, wrong_allowed=False), 1).declaration.wrong
+
+
+@pytest.mark.parametrize(
+    ("weight", "names"), [(0.101, ("cg_shift",)), (0.099, ("cg_shift", "tail_effectiveness"))]
+)
+def test_fewer_effects_lead_unless_the_odds_against_them_are_strong(weight, names):
+    assert simplest({("cg_shift", "tail_effectiveness"): 1.0, ("cg_shift",): weight}) == names
+
+
+@pytest.mark.parametrize(("weight", "names"), [(0.51, ("cg_shift",)), (0.49, ("cg_shift", "inertia_error"))])
+def test_a_further_cause_of_a_changed_loading_needs_odds_of_two(weight, names):
+    """Mass, CG and inertia are one event."""
+    sets = {
+        ("cg_shift", "inertia_error"): 1.0,
+        ("cg_shift",): weight,
+        ("cg_shift", "tail_effectiveness"): 0.2,
+    }
+    assert simplest(sets) == names
+    assert events(("cg_shift", "inertia_error", "gyro_lag")) == 2
+
+
+@given(st.dictionaries(st.tuples(st.text(max_size=2)), st.floats(1e-6, 1e3), min_size=1))
+def test_shares_add_up_to_one_and_keep_their_ratios(weights):
+    found = shares(weights)
+    assert sum(found.values()) == pytest.approx(1.0)
+    first = next(iter(weights))
+    for names, weight in weights.items():
+        assert found[names] * weights[first] == pytest.approx(found[first] * weight)
+
+
+def test_an_explanation_names_its_causes_and_wrong_declarations():
+    assert Explanation(("icing",), ("Cmq",), (1.0,), (0.1,)).effects == ("icing", "derivatives")
+    assert Explanation(("icing",), (), (1.0,), (0.1,)).effects == ("icing",)
+
+
+def test_what_other_records_tell_of_a_size_is_a_likelihood():
+    """A CG told as 0.03 +- 0.02 elsewhere: the integral of prior and both likelihoods over the size, without that at no size."""
+    plain = EFFECTS["cg_shift"]
+    first = replace(plain.parameters[0], prior_mean=0.03, prior_std=0.02)
+    v, seen = DIRECTIONS["cg"], 0.01 * DIRECTIONS["cg"]
+    logs = []
+    for effect in (plain, replace(plain, parameters=(first,))):
+        q = quadratic(seen, [c for c in causes_of(DIRECTIONS) if c.key == "cg_shift"])
+        q = replace(q, columns=(EffectColumn(effect),))
+        logs.append(max(w.log_evidence for w in q.sets(1) if w.columns and not w.declaration.wrong))
+    own = float((v / (STD**2 + TOLD**2) * v).sum())
+    x = np.linspace(-0.3, 0.3, 60001)
+    density = np.exp(-0.5 * own * (x - 0.01) ** 2 - 0.5 * (x / plain.prior.std) ** 2)
+    told = np.exp(-0.5 * (x / 0.02) ** 2 + 0.03 * x / 0.02**2)
+    expected = np.log(np.sum(density * told) / np.sum(density))
+    assert logs[1] - logs[0] == pytest.approx(expected, abs=1e-3)

@@ -14,7 +14,6 @@ from airtruth import aircraft as planes
 from airtruth import report
 from airtruth.aircraft import write as writing
 from airtruth.effects.increment import Memory, Shape, increment
-from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
 from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, shape_of, term_value
 from airtruth.table import significant
@@ -31,24 +30,14 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.presentation.text import increment_words
-from airtruth.tracing.selection.acceptance import Candidate
-from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increment_fit import (
-    FittedIncrement,
     effective_bends,
-    evidence_score,
     is_apart_from_zero,
-    redundant_increment,
 )
 from airtruth.tracing.selection.increments import log_evidences, screen, shapes, sharpened
-from airtruth.tracing.selection.pruning import pruned
-from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.release import Release
-from airtruth.tracing.selection.rounds import RoundStart, search_round
-from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.update import from_zero_alpha
 from airtruth.units import DEG
 
@@ -451,72 +440,6 @@ def beyond_one_degree(one):
     return replace(one, signals=replace(one.signals, controls_rad=measured[None]))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("order", "expected"), [((NEEDED, IDLE), None), ((IDLE, NEEDED), IDLE.key)])
-def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected):
-    rng = np.random.default_rng(5)
-    problem = tr.problem(
-        [
-            beyond_one_degree(tr.fly(rng, amplitude=a * DEG, sigma_w=0.05, name=str(a)))
-            for a in (2.5, -2.5, 2.0)
-        ]
-    )
-    hypothesis = tr.NOTHING.plus(order[0]).plus(order[1])
-    start = initial_parameters(problem, hypothesis)
-    zero = np.zeros(order[0].bends + order[1].bends)
-    found = fit(problem, hypothesis, Parameters(start.common, start.per_record, zero))
-    named = redundant_increment(SetTable(problem), found, tried=70)
-    assert (named.key if named else None) == expected
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("released", [False, True])
-def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(released):
-    rng = np.random.default_rng(5)
-    problem = tr.problem(
-        [
-            beyond_one_degree(tr.fly(rng, amplitude=a * DEG, sigma_w=0.05, name=str(a)))
-            for a in (2.5, -2.5, 2.0)
-        ]
-    )
-    named = EFFECTS["gyro_scale"]
-    hypothesis = tr.NOTHING.plus(named).plus(NEEDED)
-    if released:
-        hypothesis = replace(hypothesis, spread=9.0 * np.diag(np.diag(problem.declared_covariance)))
-    start = initial_parameters(problem, hypothesis)
-    point = Parameters(start.common, start.per_record, np.zeros(1 + NEEDED.bends))
-    every = (named, EFFECTS["elevator_delay"])
-    last = search_round(
-        SetTable(problem), RoundStart(hypothesis, point, every[1:], scores_only=True), 2, 1, lambda step: None
-    )
-    name, learned = (
-        Candidate(
-            evidence_score(FittedIncrement(e, last.null, 9.0)), last.null, 18.0, NONE, NONE, 0.1, 0.01, ()
-        )
-        for e in (named, NEEDED)
-    )
-    before = tuple(replace(last, candidates=(c,), tied=(c,)) for c in (name, learned))
-    kept = pruned(SetTable(problem), (*before, last), every, 1, 0.01, lambda step: None)
-    assert [[c.score.effect.key for c in r.tied] for r in kept] == [[], [NEEDED.key], []]
-    assert kept[0].candidates[0].reasons == (Refusal.SUPERSEDED,)
-    assert [e.key for e in kept[-1].null.hypothesis.effects] == [NEEDED.key]
-    assert kept[-1].null.hypothesis.spread is None
-    assert {s.effect.key for s in kept[-1].table.scores} == {"gyro_scale", "elevator_delay"}
-    causes = CauseSet(("gyro_scale", "cg_shift"), (), (0.1, 0.2), (0.1, 0.1), np.zeros((6, 6)), 1.0)
-    bare = replace(causes, causes=("gyro_scale",), sizes=(0.1,), size_std=(0.1,))
-    # a set keeps what is left of it; where nothing is left of the answer's, no other one takes its place
-    for sets, left in (((causes, bare), [("cg_shift",)]), ((bare, causes), None)):
-        followed = replace(before[0], release=Release(last.declared_test, last.null, sets, 0.0))
-        first = pruned(SetTable(problem), (followed, before[1], last), every, 1, 0.01, lambda step: None)[0]
-        if released or left is None:
-            assert first.release is None
-        else:
-            assert [s.effects for s in first.release.sets] == left
-    without = (replace(last, null=replace(last.null, hypothesis=tr.NOTHING)),)
-    assert pruned(SetTable(problem), without, every, 1, 0.01, lambda step: None) is without
-
-
-NONE = np.zeros(0)
 OTHERS = ("elevator_delay", "vane_lag", "gyro_lag")
 
 

@@ -29,9 +29,9 @@ Array = NDArray[np.float64]
 _LABELS: Final = ("alpha [deg]", "q [deg/s]", "az [m/s2]")
 """Names of the outputs in a figure."""
 _SCALES: Final = (1.0 / DEG, 1.0 / DEG, 1.0)
+"""Factors from SI to the units of `_LABELS`."""
 _TIE: Final = -2.0 * math.log(AS_GOOD)
 """Difference in 2 log L up to which two hypotheses explain the records equally well [-]."""
-"""Factors from SI to the units of `_LABELS`."""
 
 
 @dataclass(frozen=True)

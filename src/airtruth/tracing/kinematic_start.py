@@ -1,8 +1,7 @@
-"""Evidence of the kinematics of the fitted records, before aerodynamics: starts and ranges of refits, and disagreement.
+"""Evidence of the kinematics of the fitted records, before aerodynamics: ranges and priors of sensor errors, and disagreement.
 
-A refit of the derivatives can absorb a slow vane, which then has no score and is never a candidate. The kinematic check
-needs no aerodynamics and knows it. Its causes are therefore always refitted, from the declared aircraft. Where it needs no
-error of a sensor at all, it limits the errors that a trace may name.
+The kinematic check needs no aerodynamics. Where it needs no error of a sensor, it limits the errors that a trace may name. What
+it tells of an error of the airspeed, which no output of the filter shows, is a prior of the size.
 """
 
 from __future__ import annotations
@@ -82,27 +81,6 @@ _CHECKS: Final[Mapping[str, Callable[[Sequence[FlightLog], Aircraft], CheckResul
     "lateral": _of_side,
 }
 """Name of a motion -> kinematic check of logs with an aircraft's declared errors."""
-
-
-def starts_of(check: CheckResult | None) -> dict[str, float]:
-    """Effect -> value of its parameter [SI], of the causes that a check names."""
-    if check is None or check.verdict not in ("errors", "one_of"):
-        return {}
-    named = {f.name for cause in check.possible for f in cause.errors} | {f.name for f in _of_airspeed(check)}
-    return {f.name: _beyond_declared(f) for f in check.findings if f.name in named and f.name in EFFECTS}
-
-
-def sets_of(check: CheckResult | None, dt_s: float) -> tuple[frozenset[str], ...]:
-    """Sets of effects of the library that a check allows, the cheapest first; none where it names no error.
-
-    Parameters
-    ----------
-    dt_s : longest sample period of the fitted records [s]; a time of up to half of it is no error.
-    """
-    if check is None or check.verdict not in ("errors", "one_of"):
-        return ()
-    airspeed = {f.name for f in _of_airspeed(check)}
-    return tuple(dict.fromkeys(frozenset(_effects_of(cause, dt_s) | airspeed) for cause in check.possible))
 
 
 def _effects_of(cause: PossibleCause, dt_s: float) -> set[str]:
@@ -277,8 +255,6 @@ __all__ = [
     "excluded",
     "kinematic_check",
     "names_a_sensor",
-    "sets_of",
-    "starts_of",
     "with_contradictions",
     "within_kinematics",
 ]

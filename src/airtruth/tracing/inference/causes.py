@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect, Prior
 from airtruth.effects.registry import EFFECTS
-from airtruth.tracing.inference.hypothesis import Hypothesis
 
 Array = NDArray[np.float64]
 
