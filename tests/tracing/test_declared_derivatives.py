@@ -127,11 +127,10 @@ def test_derivatives_along_what_explains_them_are_no_contradiction(white):
 def test_what_an_answer_leaves_is_in_the_remaining_evidence(white):
     """The anomaly of the last round, or the derivatives with twice the probability of their test (Bonferroni)."""
     cause = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.5])
-    problem, fitted = fit_of(cause)
     anomaly = HypothesisTest("a drift in time", 3.0, 5, 0.4)
-    left = remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly))
-    test = contradiction(problem, fitted)
+    test = contradiction(*fit_of(cause))
+    left = remaining_evidence(SimpleNamespace(declared_test=test, anomaly=anomaly))
     assert left == HypothesisTest(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
     assert advice(left.null, LONGITUDINAL).startswith("trace again with `derivatives` among the candidates")
-    problem, fitted = fit_of(cause, np.outer(cause, cause))
-    assert remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly)) is anomaly
+    test = contradiction(*fit_of(cause, np.outer(cause, cause)))
+    assert remaining_evidence(SimpleNamespace(declared_test=test, anomaly=anomaly)) is anomaly

@@ -17,7 +17,8 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.causes import DERIVATIVES, Cause, DeclaredCauses
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.selection.best_first import best_first
-from airtruth.tracing.selection.evidence import LOG_WRONG, WRONG_BY, EffectColumn, Quadratic
+from airtruth.tracing.selection.columns import EffectColumn
+from airtruth.tracing.selection.evidence import LOG_WRONG, WRONG_BY, Quadratic
 from airtruth.tracing.selection.expansion import expanded
 from airtruth.tracing.selection.set_table import SetTable
 

@@ -12,8 +12,9 @@ from airtruth.physics.composition import TailGeometry, directions
 from airtruth.physics.motion import LATERAL
 from airtruth.tracing.inference.causes import causes_of
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, size_along
-from airtruth.tracing.selection.evidence import EffectColumn, Quadratic
-from airtruth.tracing.selection.explanation import Explanation, events, shares, simplest
+from airtruth.tracing.selection.columns import EffectColumn
+from airtruth.tracing.selection.evidence import Quadratic
+from airtruth.tracing.selection.explanation import ExplainedDerivatives, events, shares, simplest
 
 DECLARED = np.array([4.787, 31.7, 0.480, -1.785, -41.2, -1.787])
 """Derivatives of aircraft/gtm."""
@@ -128,8 +129,8 @@ def test_shares_add_up_to_one_and_keep_their_ratios(weights):
 
 
 def test_an_explanation_names_its_causes_and_wrong_declarations():
-    assert Explanation(("icing",), ("Cmq",), (1.0,), (0.1,)).effects == ("icing", "derivatives")
-    assert Explanation(("icing",), (), (1.0,), (0.1,)).effects == ("icing",)
+    assert ExplainedDerivatives(("icing",), ("Cmq",), (1.0,), (0.1,)).effects == ("icing", "derivatives")
+    assert ExplainedDerivatives(("icing",), (), (1.0,), (0.1,)).effects == ("icing",)
 
 
 def test_what_other_records_tell_of_a_size_is_a_likelihood():

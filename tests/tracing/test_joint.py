@@ -45,11 +45,9 @@ class Stated:
     def refitted(self, effects):
         return self._with("refitted", effects, tuple(effects.values()))
 
-    def beginning(self, effects, known):
-        return self._with("beginning", effects, tuple(effects.values()))
-
-    def repeated(self, effects):
-        return self._with("repeated", effects, self.repeats)
+    def repeated(self, effects, required=()):
+        step, named = ("required", tuple(effects.values())) if required else ("repeated", self.repeats)
+        return self._with(step, effects, named)
 
     def _with(self, step, effects, named):
         self.steps.append((step, effects["mass_error"].parameters[0]))
@@ -98,7 +96,7 @@ def test_a_cause_that_one_motion_names_is_one_of_both():
     ((begin, other),) = second.steps
     assert (refit, own.prior_mean) == ("refitted", pytest.approx(0.10))
     assert own.prior_std == pytest.approx(0.04)
-    assert (begin, other.prior_mean) == ("beginning", pytest.approx(0.12))
+    assert (begin, other.prior_mean) == ("required", pytest.approx(0.12))
     assert other.prior_std == pytest.approx(0.03)
     (sentence,) = sentences([cause])
     assert "one cause of both motions" in sentence

@@ -14,6 +14,7 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.kinematic_start import (
     disagreement,
     kinematic_check,
+    starts_of,
     with_contradictions,
     within_kinematics,
 )
@@ -113,6 +114,37 @@ def airspeed_check(state):
 
 def error(name, value=1.0, unit="m"):
     return SimpleNamespace(name=name, value=value, declared=0.0, unit=unit)
+
+
+def test_alternatives_of_a_check_are_sets_and_its_airspeed_belongs_to_each():
+    """Errors that the library lacks take no part: a lag of the attitude alone needs no effect."""
+    check = airspeed_check("not needed")
+    one, other, attitude = map(error, ("vane_arm", "accelerometer_arm", "attitude_lag"))
+    check.possible = tuple(
+        SimpleNamespace(errors=errors) for errors in ((one,), (other, attitude), (attitude,))
+    )
+    airspeed = check.findings
+    check.findings = (
+        *airspeed,
+        *(Finding(e.name, "m", "", 1.0, 0.1, 0.8, 1.2, 0.0, 0.2, "present") for e in (one, other)),
+    )
+    assert starts_of(check, 0.02) == ({"vane_arm": 1.0}, {"accelerometer_arm": 1.0})
+    check.findings = (*airspeed_check("present").findings, *check.findings[len(airspeed) :])
+    assert starts_of(check, 0.02) == (
+        {"airspeed_alpha_slope": -0.5, "vane_arm": 1.0},
+        {"accelerometer_arm": 1.0, "airspeed_alpha_slope": -0.5},
+        {"airspeed_alpha_slope": -0.5},
+    )
+    check.verdict = "failed"
+    assert starts_of(check, 0.02) == starts_of(None, 0.02) == ()
+
+
+@pytest.mark.parametrize(("lag_s", "names"), [(0.0099, ()), (0.0101, ({"vane_lag": 0.0101},))])
+def test_a_time_of_half_a_sample_is_no_error(lag_s, names):
+    check = airspeed_check("not needed")
+    check.possible = (SimpleNamespace(errors=(error("vane_lag", lag_s, "s"),)),)
+    check.findings = (Finding("vane_lag", "s", "", lag_s, 0.001, 0.0, 0.02, 0.0, 0.001, "present"),)
+    assert starts_of(check, 0.02) == names
 
 
 def test_a_position_error_of_the_check_is_a_prior():

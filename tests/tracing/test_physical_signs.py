@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.tracing.selection import acceptance
+from airtruth.tracing.selection import predictive
 
 
 def reasons(key, size, span_m=2.0, declared=0.0):
-    return set(acceptance.size_reasons(EFFECTS[key], size, span_m, declared))
+    return set(predictive.size_reasons(EFFECTS[key], size, span_m, declared))
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_a_mode_without_the_damping_of_a_mode():
     def given(frequency_hz, damping):
         values = {"dCmalpha": -0.4, "frequency_hz": frequency_hz, "damping": damping}
         sizes = np.array([p.size(values[p.name]) for p in effect.parameters])
-        return list(acceptance.shape_reasons(effect, sizes))
+        return list(predictive.shape_reasons(effect, sizes))
 
     assert end <= 0.2
     assert given(3.0, 0.05) == []
@@ -67,4 +67,4 @@ def test_a_mode_without_the_damping_of_a_mode():
 def test_a_break_may_lie_at_the_end_of_the_records():
     effect = EFFECTS["cm_alpha_nonlinear:break"]
     at = effect.parameters[1]
-    assert list(acceptance.shape_reasons(effect, np.array([0.3, at.size(at.high)]))) == []
+    assert list(predictive.shape_reasons(effect, np.array([0.3, at.size(at.high)]))) == []

@@ -18,7 +18,7 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import respond
-from airtruth.tracing.selection import acceptance
+from airtruth.tracing.selection import predictive
 from airtruth.units import DEG
 
 ARM = EFFECTS["vane_arm"]
@@ -218,12 +218,12 @@ def test_an_effect_that_alone_keeps_the_free_run_from_diverging_is_no_loss(fitte
     """Derivatives refitted without a large effect can be those of an unstable aircraft: the free run of every record leaves
     all bounds, and nothing is left to compare."""
     problem, found = fitted
-    reference = acceptance.reference_of(
+    reference = predictive.reference_of(
         problem, fit(problem, tr.NOTHING, replace(found.point, sizes=np.zeros(0)))
     )
     way = reference.left_out[0]
     lost = [replace(a, residual=np.full_like(a.residual, 1e9)) for a in way.assessments]
-    tested = acceptance.tested_on_left_out(
+    tested = predictive.tested_on_left_out(
         problem, found, replace(reference, left_out=(way._replace(assessments=lost),)), gain=100.0
     )
     assert tested.reasons == ()
@@ -244,8 +244,8 @@ def test_losses_of_two_channels_that_are_one_count_once(gains, correlation, lose
     covariance = np.diag([4.0, 9.0, 1.0])
     covariance[0, 1] = covariance[1, 0] = correlation * 6.0
     scaled = np.array(gains) * [2.0, 3.0, 1.0]
-    assert acceptance.loses_in_two_channels(scaled, covariance) == loses
+    assert predictive.loses_in_two_channels(scaled, covariance) == loses
 
 
 def test_a_channel_without_a_sensor_loses_nothing():
-    assert not acceptance.loses_in_two_channels(np.array([0.0, -3.0, 0.0]), np.diag([0.0, 1.0, 0.0]))
+    assert not predictive.loses_in_two_channels(np.array([0.0, -3.0, 0.0]), np.diag([0.0, 1.0, 0.0]))

@@ -38,7 +38,7 @@ from airtruth.tracing.inference.derivative_likelihood import (
 )
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.selection.explanation import AS_GOOD, Explanation
+from airtruth.tracing.selection.explanation import AS_GOOD, ExplainedDerivatives
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.significance import CONTRADICTED
 
@@ -322,7 +322,7 @@ def _row(
 
 
 def _estimates(
-    key: str, best: Explanation, last: SearchRound, covariance: Array
+    key: str, best: ExplainedDerivatives, last: SearchRound, covariance: Array
 ) -> dict[str, ParameterEstimate]:
     if key == DERIVATIVES:
         shift, std = last.null.point.common, np.sqrt(np.diag(covariance))

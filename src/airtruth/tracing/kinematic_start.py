@@ -1,6 +1,7 @@
-"""Evidence of the kinematics of the fitted records, before aerodynamics: ranges and priors of sensor errors, and disagreement.
+"""Evidence of the kinematics of the fitted records, before aerodynamics: starts, ranges and priors of sensor errors.
 
-The kinematic check needs no aerodynamics. Where it needs no error of a sensor, it limits the errors that a trace may name. What
+A refit of the derivatives can absorb a slow vane. The kinematic check needs no aerodynamics and knows it, so that the search
+begins at its sets of errors too. Where it needs no error of a sensor, it limits the errors that a trace may name. What
 it tells of an error of the airspeed, which no output of the filter shows, is a prior of the size.
 """
 
@@ -81,6 +82,21 @@ _CHECKS: Final[Mapping[str, Callable[[Sequence[FlightLog], Aircraft], CheckResul
     "lateral": _of_side,
 }
 """Name of a motion -> kinematic check of logs with an aircraft's declared errors."""
+
+
+def starts_of(check: CheckResult | None, dt_s: float) -> tuple[dict[str, float], ...]:
+    """Sets of effects of the library that a check allows, the cheapest first, as key -> value [SI]; none where it names no error.
+
+    Parameters
+    ----------
+    dt_s : longest sample period of the fitted records [s]; a time of up to half of it is no error.
+    """
+    if check is None or check.verdict not in ("errors", "one_of"):
+        return ()
+    values = {f.name: _beyond_declared(f) for f in check.findings}
+    airspeed = {f.name for f in _of_airspeed(check)}
+    sets = dict.fromkeys(frozenset(_effects_of(cause, dt_s) | airspeed) for cause in check.possible)
+    return tuple({name: values[name] for name in sorted(one)} for one in sets if one)
 
 
 def _effects_of(cause: PossibleCause, dt_s: float) -> set[str]:
@@ -255,6 +271,7 @@ __all__ = [
     "excluded",
     "kinematic_check",
     "names_a_sensor",
+    "starts_of",
     "with_contradictions",
     "within_kinematics",
 ]

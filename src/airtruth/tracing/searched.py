@@ -12,6 +12,7 @@ from airtruth.effects.effect import Effect
 from airtruth.errors import LogError
 from airtruth.tracing.calibration.calibrated import calibrated
 from airtruth.tracing.calibration.noise_colour import beside, later_level
+from airtruth.tracing.kinematic_start import starts_of
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case
@@ -112,9 +113,17 @@ def searched(case: Case, options: TraceOptions, advance: Advance, kinematics: Ch
 
 def _rounds(own: Searched, required: Collection[str] = ()) -> tuple[SearchRound, ...]:
     """The rounds of a search."""
-    case, seed = own.case, own.options.seed
+    case = own.case
     return search(
-        own.sets, case.hypothesis, own.start, case.effects, seed, case.declared, own.advance, required
+        own.sets,
+        case.hypothesis,
+        own.start,
+        case.effects,
+        own.options.seed,
+        case.declared,
+        own.advance,
+        required,
+        starts_of(own.kinematics, own.longest_period_s),
     )
 
 

@@ -1,13 +1,14 @@
 """Best-first search over sets of effects: quadratics predict their evidence, and the best are refitted.
 
-The quadratic about the best fit predicts the evidence of every set of up to three effects. The best set without a refit is
+Quadratics about the declared aircraft, the fit without any effect and the best fit predict the evidence of every set of up to
+three effects. The best set without a refit is
 refitted from the predicted point, and its own quadratic gives its evidence with every explanation of the derivatives. A fit that
 leads is expanded in turn. The search ends when no set without a refit is predicted within `ODDS` of the best.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -22,7 +23,7 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.evidence import Quadratic, Weighed
 from airtruth.tracing.selection.expansion import Expansion, expanded
-from airtruth.tracing.selection.explanation import Explanation, shares, simplest
+from airtruth.tracing.selection.explanation import ExplainedDerivatives, shares, simplest
 from airtruth.tracing.selection.set_table import SetTable
 
 ODDS: Final = 3.0
@@ -31,6 +32,9 @@ REFITS: Final = 30
 """Largest number of refits [-] (judgement: ten to forty seconds)."""
 MOST_EFFECTS: Final = 3
 """Largest number of effects of a set that a quadratic predicts [-] (judgement: four in a few records have not been separable)."""
+_HELD: Final = 1e-4
+"""Variance of derivatives that are held as they are declared, over the declared one [-] (judgement: a hundredth of a standard
+deviation)."""
 _SAME: Final = 0.05
 """Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 Names = tuple[str, ...]
@@ -38,7 +42,7 @@ Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class EvaluatedSet:
     """A set with its evidence.
 
     Attributes
@@ -70,15 +74,15 @@ class Evaluated:
         return own and (fitted.spread is not None) == self.explains_derivatives
 
     @property
-    def explanation(self) -> Explanation | None:
-        """What it states of the derivatives; None where it leaves them as they are declared."""
+    def explanation(self) -> ExplainedDerivatives | None:
+        """The derivatives by this set; None where it leaves them as they are declared."""
         if not self.explains_derivatives:
             return None
         q, w = self.quadratic, self.weighed
         sizes, std = q.alone(w)
         at = [k for k, i in enumerate(w.columns) if q.columns[i].cause is not None]
         motion = self.expansion.last.hypothesis.motion
-        return Explanation(
+        return ExplainedDerivatives(
             tuple(q.columns[w.columns[k]].key for k in at),
             tuple(motion.parameters[i] for i in w.declaration.wrong),
             tuple(float(sizes[k]) for k in at),
@@ -101,7 +105,7 @@ class Posterior:
     """
 
     weights: Mapping[Names, float]
-    evaluated: Mapping[Names, Evaluated]
+    evaluated: Mapping[Names, EvaluatedSet]
     fits: Mapping[frozenset[str], PosteriorFit]
     null: PosteriorFit
     refits: int
@@ -125,6 +129,7 @@ def best_first(
     effects: Sequence[Effect],
     declared: DeclaredCauses,
     advance: Advance = lambda step: None,
+    known: Sequence[Mapping[str, float]] = (),
 ) -> Posterior | None:
     """Posterior probabilities of the sets of effects; None where not even the declared aircraft can be fitted.
 
@@ -133,12 +138,13 @@ def best_first(
     sets : fits of the search; hypothesis, start : the declared aircraft, and where the search for its parameters begins.
     effects : candidates of the filter; declared : what else changes the derivatives.
     advance : receives the step that begins, or holds the time budget.
+    known : sets of effects at which the search begins too: key -> value of the first parameter in its unit.
     """
     null = sets.converged(hypothesis, start)
     if null is None:
         return None
     free = tuple(e for e in effects if e.parameters[0].low < e.parameters[0].high)
-    return _BestFirst(sets, hypothesis, free, declared, advance).run(null)
+    return _BestFirst(sets, hypothesis, free, declared, advance).run(null, known)
 
 
 class _BestFirst:
@@ -159,15 +165,20 @@ class _BestFirst:
         self.temper = 1.0
         self.refits = 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
-        self._read: dict[tuple[int, float], list[Evaluated]] = {}
+        self._read: dict[tuple[int, float], list[EvaluatedSet]] = {}
         self._expansions: list[Expansion] = []
-        self._told: dict[tuple[int, float], dict[frozenset[str], Evaluated]] = {}
-        self._predicted: dict[frozenset[str], Evaluated] = {}
+        self._told: dict[tuple[int, float], dict[frozenset[str], EvaluatedSet]] = {}
+        self._predicted: dict[frozenset[str], EvaluatedSet] = {}
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
 
-    def run(self, null: PosteriorFit) -> Posterior:
+    def run(self, null: PosteriorFit, known: Sequence[Mapping[str, float]]) -> Posterior:
         """Refit set after set until no other one can come within the odds."""
         self._fits[frozenset()] = [expanded(self.sets.problem, null)]
+        as_declared = self._as_declared(null)
+        if as_declared is not None:
+            self._expansions.append(expanded(self.sets.problem, as_declared, self.effects))
+        for sizes in known:
+            self._begin_at(null, sizes)
         self._tempered(null)
         measured: list[PosteriorFit] = [null]
         seen: list[PosteriorFit] = []
@@ -194,6 +205,25 @@ class _BestFirst:
         }
         return Posterior(_normalised(logs), evaluated, fits, null, self.refits, self.temper)
 
+    def _begin_at(self, null: PosteriorFit, known: Mapping[str, float]) -> None:
+        """Refit a set from the declared aircraft at known values."""
+        effects = tuple(e for e in self.effects if e.key in known and len(e.parameters) == 1)
+        if not effects or not may_begin(self.advance, f"refit {' + '.join(e.key for e in effects)}"):
+            return
+        sizes = np.array([e.parameters[0].size(known[e.key]) for e in effects])
+        hypothesis = replace(self.hypothesis, effects=effects)
+        own = self.sets.fit_from_declared(hypothesis, sizes, null)
+        self.refits += 1
+        if own is not None:
+            self._fits.setdefault(frozenset(e.key for e in effects), []).append(
+                expanded(self.sets.problem, own)
+            )
+
+    def _as_declared(self, null: PosteriorFit) -> PosteriorFit | None:
+        """The fit with the declared derivatives: those of the null may have absorbed an effect."""
+        spread = (_HELD - 1.0) * self.sets.problem.declared_covariance
+        return self.sets.fit(replace(self.hypothesis, spread=spread), null.point)
+
     def _tempered(self, fitted: PosteriorFit) -> bool:
         """Set the ratio of variances to that of a fit; whether it has changed."""
         ratio = inflation(self.sets.problem, fitted, unbiased=True)
@@ -206,21 +236,21 @@ class _BestFirst:
         self._predicted = self._predictions()
         return True
 
-    def _best(self) -> Evaluated:
+    def _best(self) -> EvaluatedSet:
         """The most probable set with a refit."""
         every = [p for key in self._fits for p in self._of_fit(key)]
         return max(every, key=lambda p: p.weighed.log_evidence)
 
-    def _of_fit(self, key: frozenset[str]) -> list[Evaluated]:
+    def _of_fit(self, key: frozenset[str]) -> list[EvaluatedSet]:
         """The sets with some effects of the filter that their fits weigh: with each explanation of the derivatives."""
-        found: list[Evaluated] = []
+        found: list[EvaluatedSet] = []
         for expansion in self._fits[key]:
             at = id(expansion), self.temper
             if at not in self._read:
                 q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
                 every = q.sets(min(MOST_EFFECTS + 1, len(key) + 2))
                 own = (w for w in every if q.in_filter(w) == key)
-                self._read[at] = [Evaluated(expansion, q, w) for w in own]
+                self._read[at] = [EvaluatedSet(expansion, q, w) for w in own]
             found += self._read[at]
         return found
 
@@ -229,33 +259,34 @@ class _BestFirst:
         self._expansions.append(expanded(self.sets.problem, fitted, self.effects))
         self._predicted = self._predictions()
 
-    def _predictions(self) -> dict[frozenset[str], Evaluated]:
+    def _predictions(self) -> dict[frozenset[str], EvaluatedSet]:
         """The sets by their effects of the filter, each as the quadratic predicts it whose fit differs from it by the fewest
-        effects; the later of two."""
-        nearest: dict[frozenset[str], tuple[int, Evaluated | None]] = {}
-        every = [
+        effects; the better of two."""
+        told = [
             (frozenset(e.key for e in x.last.hypothesis.effects), self._told_by(x)) for x in self._expansions
         ]
-        for key in {key for _, told in every for key in told}:
-            for own, told in every:
-                apart = len(own ^ key)
-                if key not in nearest or apart <= nearest[key][0]:
-                    nearest[key] = apart, told.get(key)
-        return {key: p for key, (_, p) in nearest.items() if p is not None}
+        found: dict[frozenset[str], EvaluatedSet] = {}
+        for key in {key for _, every in told for key in every}:
+            nearest = min(len(own ^ key) for own, _ in told)
+            by_nearest = (every.get(key) for own, every in told if len(own ^ key) == nearest)
+            known = [p for p in by_nearest if p is not None]
+            if known:
+                found[key] = max(known, key=lambda p: p.weighed.log_evidence)
+        return found
 
-    def _told_by(self, expansion: Expansion) -> dict[frozenset[str], Evaluated]:
+    def _told_by(self, expansion: Expansion) -> dict[frozenset[str], EvaluatedSet]:
         at = id(expansion), self.temper
         if at not in self._told:
             q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
             self._told[at] = {
-                q.in_filter(w): Evaluated(expansion, q, w)
+                q.in_filter(w): EvaluatedSet(expansion, q, w)
                 for w in sorted(q.sets(MOST_EFFECTS), key=lambda w: w.log_evidence)
             }
         return self._told[at]
 
-    def _following(self, best: Evaluated) -> Evaluated | None:
+    def _following(self, best: EvaluatedSet) -> EvaluatedSet | None:
         """The set to refit next: the best one under the prior of its own derivatives, the best without a refit, and at last the
-        simplest one that an answer can state."""
+        simplest one that an answer can state, and those of one effect less: far from its fit a quadratic predicts badly."""
         if self._wants(best):
             return best
         left = (p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p))
@@ -269,19 +300,28 @@ class _BestFirst:
             return leading
         logs, evaluated = self._evidence()
         answer = evaluated[simplest(_normalised(logs))]
-        return answer if self._wants(answer) else None
+        return next((p for p in (answer, *self._smaller(answer)) if self._wants(p)), None)
 
-    def _wants(self, p: Evaluated) -> bool:
+    def _smaller(self, answer: EvaluatedSet) -> Iterator[EvaluatedSet]:
+        """The sets without one of the effects of the filter, whose refits show that the answer needs each."""
+        q, w = answer.quadratic, answer.weighed
+        for i in w.columns:
+            if q.columns[i].effect is not None:
+                less = EvaluatedSet(answer.expansion, q, q.without(w, i))
+                if q.in_filter(less.weighed) not in self._fits:
+                    yield less
+
+    def _wants(self, p: EvaluatedSet) -> bool:
         return self._is_new(p) and (p.explains_derivatives or not p.is_refitted)
 
-    def _is_new(self, p: Evaluated) -> bool:
+    def _is_new(self, p: EvaluatedSet) -> bool:
         return self._row(p) not in self._tried
 
     @staticmethod
-    def _row(p: Evaluated) -> tuple[frozenset[str], Names, tuple[int, ...]]:
+    def _row(p: EvaluatedSet) -> tuple[frozenset[str], Names, tuple[int, ...]]:
         return p.quadratic.in_filter(p.weighed), p.names, p.weighed.declaration.wrong
 
-    def _refit(self, p: Evaluated) -> None:
+    def _refit(self, p: EvaluatedSet) -> None:
         """Refit a set from its predicted point, and from the declared aircraft where that leads nowhere."""
         self._tried.add(self._row(p))
         hypothesis, start = self._start(p)
@@ -292,12 +332,12 @@ class _BestFirst:
             again = self.sets.fit_from_declared(hypothesis, start.sizes, before)
             self.refits += 1
             if again is not None and (own is None or again.cost < own.cost):
-                own = again
+                own = self.sets.converged(hypothesis, again.point) or again
         if own is not None:
             key = frozenset(e.key for e in hypothesis.effects)
             self._fits.setdefault(key, []).append(expanded(self.sets.problem, own))
 
-    def _start(self, p: Evaluated) -> tuple[Hypothesis, Parameters]:
+    def _start(self, p: EvaluatedSet) -> tuple[Hypothesis, Parameters]:
         """The hypothesis of a set with its own prior of the derivatives, and the point where the quadratic is least."""
         q, w = p.quadratic, p.weighed
         spread = w.declaration.spread.copy()
@@ -320,12 +360,12 @@ class _BestFirst:
         total = spread + of_cause
         return replace(self.hypothesis, effects=effects, spread=total if total.any() else None), point
 
-    def _evidence(self) -> tuple[dict[Names, float], dict[Names, Evaluated]]:
+    def _evidence(self) -> tuple[dict[Names, float], dict[Names, EvaluatedSet]]:
         """Names of each set -> log-evidence, and its most probable member; a set without a refit has the predicted evidence."""
         logs: dict[Names, float] = {}
-        evaluated: dict[Names, Evaluated] = {}
+        evaluated: dict[Names, EvaluatedSet] = {}
 
-        def add(p: Evaluated) -> None:
+        def add(p: EvaluatedSet) -> None:
             names, log = p.names, p.weighed.log_evidence
             logs[names] = float(np.logaddexp(logs.get(names, -np.inf), log))
             known = evaluated.get(names)
@@ -333,7 +373,7 @@ class _BestFirst:
                 evaluated[names] = p
 
         for key in self._fits:
-            best: dict[tuple[tuple[int, ...], tuple[int, ...], float], Evaluated] = {}
+            best: dict[tuple[tuple[int, ...], tuple[int, ...], float], EvaluatedSet] = {}
             for p in self._of_fit(key):
                 d = p.weighed.declaration
                 row = p.weighed.columns, d.wrong, float(np.trace(d.spread))
@@ -354,4 +394,4 @@ def _normalised(logs: Mapping[Names, float]) -> dict[Names, float]:
     return shares({names: float(np.exp(logs[names] - top)) for names in order})
 
 
-__all__ = ["ODDS", "Evaluated", "Posterior", "best_first"]
+__all__ = ["ODDS", "EvaluatedSet", "Posterior", "best_first"]

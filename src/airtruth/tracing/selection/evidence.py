@@ -23,16 +23,17 @@ J. Am. Statist. Assoc. 90 (1995) 773-795, section 4.1 (Laplace's method); F. Pau
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-from airtruth.effects.effect import Effect, Prior
-from airtruth.tracing.inference.causes import DERIVATIVES, Cause
+from airtruth.tracing.inference.causes import DERIVATIVES
+from airtruth.tracing.selection.columns import EffectColumn, SizePriors, size_priors
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,103 +46,14 @@ LOG_SAME_EVENT: Final = -1.0
 LOG_WRONG: Final = -1.0
 """Logarithm of the prior odds of wrong declarations, and of each derivative that they concern [-] (judgement: they are
 the most frequent cause)."""
-SINGULAR: Final = 1e-6
+_SINGULAR: Final = 1e-6
 """Least share of an information that remains beside the others of a set [-] (judgement: less is no other effect)."""
-_LEAST_SHAPE: Final = 0.1
-"""Uncertainty of the shape of a cause from which it widens the derivatives [-] (judgement: less is second order)."""
 _NEGLIGIBLE: Final = 15.0
 """Log-evidence behind the best set of a size from which a set is left out [-] (judgement: a weight of 3e-7)."""
 _EVERY: Final = 6
 """Number of derivatives of which every set of wrong declarations is compared [-] (judgement: 64 sets; of 15 there are 32768)."""
 _WRONG_BESIDE: Final = 4
 """Number of sets of wrong declarations that are compared beside more than one effect [-] (judgement)."""
-
-
-@dataclass(frozen=True)
-class EffectColumn:
-    """An effect of the filter, or a cause that changes the derivatives alone.
-
-    Attributes
-    ----------
-    effect, cause : one of them.
-    locations : parameters of the effect after its size; tried : number of locations that were compared.
-    freed : derivatives that the effect leaves without a declaration (`hypothesis.unconstrained_by`).
-    """
-
-    effect: Effect | None = None
-    cause: Cause | None = None
-    locations: tuple[float, ...] = ()
-    tried: int = 1
-    freed: tuple[int, ...] = ()
-
-    @property
-    def key(self) -> str:
-        """Key of the effect."""
-        return self.effect.key if self.effect is not None else self.of_cause.key
-
-    @property
-    def label(self) -> str:
-        """Name of the effect in sets."""
-        return self.effect.label if self.effect is not None else self.of_cause.key
-
-    @property
-    def of_cause(self) -> Cause:
-        """The cause.
-
-        Raises
-        ------
-        ValueError
-            If there is none.
-        """
-        if self.cause is None:
-            raise ValueError("the column is an effect of the filter")
-        return self.cause
-
-    @property
-    def prior(self) -> Prior | None:
-        """Normal prior of the size; None for one that is log-uniform."""
-        return self.effect.prior if self.effect is not None else self.of_cause.prior
-
-    @property
-    def log_odds(self) -> float:
-        """Logarithm of the prior odds, shared among the locations that were compared."""
-        prior = self.prior
-        return (Prior.log_odds if prior is None else prior.log_odds) - float(np.log(self.tried))
-
-    @property
-    def event(self) -> str:
-        """Event that moves it together with other effects; empty for an effect of its own."""
-        return self.effect.event if self.effect is not None else self.of_cause.event
-
-    @property
-    def widens(self) -> bool:
-        """Whether it widens the prior of the derivatives."""
-        return bool(self.freed) or (self.cause is not None and self.cause.prior.shape > _LEAST_SHAPE)
-
-    @property
-    def told(self) -> tuple[float, float]:
-        """Precision s^-2 of what other records tell of the size, and the precision times their mean b; zero for nothing."""
-        if self.effect is None:
-            return 0.0, 0.0
-        first = self.effect.parameters[0]
-        return first.prior_std**-2.0, first.prior_mean * first.prior_std**-2.0
-
-    def may_join(self, other: EffectColumn) -> bool:
-        """Whether both may be in one set: not two variants of one effect, but delays of two channels."""
-        late = [("" if c.effect is None else c.effect.late_signal) for c in (self, other)]
-        apart = late[0] != late[1] and "" not in late
-        return self.key != other.key and (self.label != other.label or apart)
-
-
-class _SizePriors(NamedTuple):
-    """(columns,) constant of the log-density, 1 if it falls with the logarithm of the size, range, least size, and sign."""
-
-    constant: Array
-    falls: Array
-    low: Array
-    high: Array
-    least: Array
-    sign: Array
 
 
 @dataclass(frozen=True)
@@ -218,8 +130,8 @@ class Quadratic:
         return np.array([c.told for c in self.columns]).reshape(-1, 2).T
 
     @cached_property
-    def _size_priors(self) -> _SizePriors:
-        return _SizePriors(*np.array([_size_prior(c) for c in self.columns]).reshape(-1, 6).T)
+    def _size_priors(self) -> SizePriors:
+        return size_priors(self.columns)
 
     def given(self, spread: Array) -> tuple[float, Array, Array]:
         """Log-evidence without any size, and slope and information of the sizes, the declared parameters eliminated.
@@ -277,13 +189,27 @@ class Quadratic:
                 found += [w for i in special for w in self._sets(declaration, (i,), 1)]
         return found
 
+    def without(self, weighed: Weighed, column: int) -> Weighed:
+        """A set without one of its effects."""
+        columns = tuple(i for i in weighed.columns if i != column)
+        spread = weighed.declaration.spread + self._widened(columns)
+        own, slope, information = self.given(spread)
+        own += weighed.declaration.log_odds
+        if not columns:
+            return Weighed((), np.zeros(0), weighed.declaration, own)
+        chosen = np.array([columns], dtype=np.int64)
+        sizes, logs = self._laplace(slope, information, chosen)
+        total = own + float(logs[0] + self._odds(chosen)[0])
+        return Weighed(columns, sizes[0], weighed.declaration, total)
+
+    def _widened(self, columns: Sequence[int]) -> Array:
+        """Covariance that the columns of a set add to the derivatives."""
+        every = (self.widening(i) for i in columns if self.columns[i].widens)
+        return np.asarray(sum(every, np.zeros((self.derivatives, self.derivatives))))
+
     def alone(self, weighed: Weighed) -> tuple[Array, Array]:
         """(number,) sizes of a set and their standard deviations, without any prior of the sizes."""
-        spread = weighed.declaration.spread.copy()
-        for i in weighed.columns:
-            if self.columns[i].widens:
-                spread += self.widening(i)
-        _, slope, information = self.given(spread)
+        _, slope, information = self.given(weighed.declaration.spread + self._widened(weighed.columns))
         rows = list(weighed.columns)
         covariance = np.linalg.pinv(information[np.ix_(rows, rows)], hermitian=True)
         return -covariance @ slope[rows], np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -336,7 +262,7 @@ class Quadratic:
 
     def _sets(self, declaration: Declaration, beside: tuple[int, ...], most: int) -> list[Weighed]:
         """Sets of columns that do not widen the derivatives, in addition to ``beside``."""
-        spread = declaration.spread + sum(map(self.widening, beside), np.zeros_like(declaration.spread))
+        spread = declaration.spread + self._widened(beside)
         own, slope, information = self.given(spread)
         own += declaration.log_odds
         found: list[Weighed] = []
@@ -373,7 +299,7 @@ class Quadratic:
         sizes, logs = np.full(chosen.shape, np.nan), np.full(len(chosen), -np.inf)
         variance = np.diagonal(own, axis1=1, axis2=2)
         scale = np.sqrt(np.where(variance > 0.0, variance, np.inf))
-        sound = np.linalg.det(own / (scale[:, :, None] * scale[:, None, :])) > SINGULAR
+        sound = np.linalg.det(own / (scale[:, :, None] * scale[:, None, :])) > _SINGULAR
         if not sound.any():
             return sizes, logs
         normal = np.array([0.0 if c.prior is None else c.prior.std**-2.0 for c in self.columns])
@@ -397,19 +323,4 @@ class Quadratic:
         return np.asarray((density + inside).sum(axis=1))
 
 
-def _size_prior(c: EffectColumn) -> tuple[float, float, float, float, float, float]:
-    """Prior of the size of a column; see `_SizePriors`. What is one-sided has no lower end but the least size."""
-    prior = c.prior
-    if c.effect is None or prior is not None:
-        given = c.of_cause.prior if prior is None else prior
-        return (-0.5 * float(np.log(2.0 * np.pi * given.std**2)), 0.0, given.low, given.high, 0.0, 0.0)
-    first = c.effect.parameters[0]
-    low, high = first.reach
-    sign = 1.0 if low >= 0.0 else float(first.sign)
-    end = max(abs(low), abs(high))
-    least = min(first.material, 0.5 * end)
-    sides = 1.0 if sign else 2.0
-    return (-float(np.log(sides * np.log(end / least))), 1.0, -end if low >= 0.0 else low, high, least, sign)
-
-
-__all__ = ["SINGULAR", "Declaration", "EffectColumn", "Quadratic", "Weighed"]
+__all__ = ["Declaration", "Quadratic", "Weighed"]

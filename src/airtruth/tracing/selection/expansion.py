@@ -24,7 +24,8 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.evidence import EffectColumn, Quadratic
+from airtruth.tracing.selection.columns import EffectColumn
+from airtruth.tracing.selection.evidence import Quadratic
 from airtruth.tracing.selection.score_test import LOCATIONS, directions, perceptible_step
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What explains the derivatives of an answer, and which of several sets of effects an answer states."""
+"""The set of effects that an answer states, of several with their weights, and its explanation of the derivatives."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ twenty)."""
 
 
 @dataclass(frozen=True)
-class Explanation:
+class ExplainedDerivatives:
     """Physical causes that the filter does not carry, and wrong declarations of derivatives.
 
     Attributes
@@ -71,4 +71,4 @@ def events(effects: Sequence[str]) -> int:
     return own.count("") + len(set(own) - {""})
 
 
-__all__ = ["AS_GOOD", "AS_PROBABLE", "Explanation", "events", "shares", "simplest"]
+__all__ = ["AS_GOOD", "AS_PROBABLE", "ExplainedDerivatives", "events", "shares", "simplest"]

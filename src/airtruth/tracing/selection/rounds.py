@@ -18,7 +18,7 @@ from airtruth.tracing.inference.profile import Profile
 from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.candidate import Candidate
-from airtruth.tracing.selection.explanation import Explanation
+from airtruth.tracing.selection.explanation import ExplainedDerivatives
 from airtruth.tracing.selection.omnibus import anomalies
 from airtruth.tracing.selection.score_test import ScoreTable
 from airtruth.tracing.selection.significance import strongest
@@ -58,7 +58,7 @@ class SearchRound:
     candidates: tuple[Candidate, ...] = ()
     tied: tuple[Candidate, ...] = ()
     profile: Profile | None = None
-    explanation: Explanation | None = None
+    explanation: ExplainedDerivatives | None = None
     posterior: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
     @property

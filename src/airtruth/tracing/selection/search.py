@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +13,11 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.profile import best_location, location_index, relocated
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.best_first import Evaluated, Names, Posterior, best_first
+from airtruth.tracing.selection.best_first import EvaluatedSet, Names, Posterior, best_first
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.explanation import shares, simplest
-from airtruth.tracing.selection.predictive import is_plausible, predicts_records_left_out
+from airtruth.tracing.selection.predictive import has_converged, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.rounds import SearchRound, scored
 from airtruth.tracing.selection.score_test import Score
 from airtruth.tracing.selection.set_table import SetTable, in_order_of
@@ -32,6 +32,7 @@ def search(
     declared: DeclaredCauses,
     advance: Advance = lambda step: None,
     required: Collection[str] = (),
+    known: Sequence[Mapping[str, float]] = (),
 ) -> tuple[SearchRound, ...]:
     """The rounds of the set that an answer states; none where not even the declared aircraft can be fitted.
 
@@ -47,8 +48,9 @@ def search(
     seed : seed of the random draws behind p-values.
     advance : receives the step that begins, or holds the time budget.
     required : keys of effects that the set has to hold, where any set has them.
+    known : as of `airtruth.tracing.selection.best_first.best_first`.
     """
-    found = best_first(sets, hypothesis, start, effects, declared, advance)
+    found = best_first(sets, hypothesis, start, effects, declared, advance, known)
     if found is None:
         return ()
     chosen, left = _chosen(sets, found, required)
@@ -57,7 +59,7 @@ def search(
 
 def _chosen(
     sets: SetTable, found: Posterior, required: Collection[str]
-) -> tuple[Evaluated | None, dict[Names, float]]:
+) -> tuple[EvaluatedSet | None, dict[Names, float]]:
     """The set of the answer, None for none, and the weights of the sets without those that were refused."""
     left = {
         names: weight
@@ -65,18 +67,18 @@ def _chosen(
         if set(required) <= found.evaluated[names].quadratic.in_filter(found.evaluated[names].weighed)
     } or dict(found.weights)
     best = None
-    while left and (names := simplest(left)):
+    while any(left.values()) and (names := simplest(left)):
         best = found.evaluated[names]
         if best.is_refitted and _is_sound(sets, found.null, best.expansion.last):
             break
         best = None
         del left[names]
-    return best, shares(left or {(): 1.0})
+    return best, shares(left if any(left.values()) else {(): 1.0})
 
 
 def _is_sound(sets: SetTable, null: PosteriorFit, fitted: PosteriorFit) -> bool:
     """Whether a fit has converged to plausible sizes, and is no worse than the null on records left out."""
-    if not fitted.converged:
+    if not has_converged(fitted, 2.0 * (null.cost - fitted.cost)):
         return False
     named = fitted.hypothesis.effects
     return not named or (
@@ -98,7 +100,7 @@ class _Stated:
     seed: int
     advance: Advance
 
-    def rounds(self, found: Posterior, chosen: Evaluated | None) -> tuple[SearchRound, ...]:
+    def rounds(self, found: Posterior, chosen: EvaluatedSet | None) -> tuple[SearchRound, ...]:
         """A round for each effect of the filter, the most probable one first, and the last round."""
         last, rounds = found.null, []
         if chosen is not None:
