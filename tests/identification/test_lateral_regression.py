@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from airtruth.identification import identify_batch
+from airtruth.identification import LATERAL_METHODS, identify_batch
+from airtruth.identification.doubts import curvature
 from airtruth.identification.estimates import Status, quantities
 from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
+from airtruth.identification.lateral.methods import LINEAR
 from airtruth.identification.lateral.observation import observe
 from airtruth.identification.lateral.problems import ls_problem, rate_of, smoothed
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
@@ -236,3 +238,14 @@ def test_straight_coefficients_show_no_terms():
     p = p_values(batch, GTM, Options())
     assert (p < 0.05).mean() < 0.09
     assert not (p < SIGNIFICANT).any()
+
+
+def test_methods_whose_intervals_leave_out_a_nonlinear_term_are_named():
+    found = {("alpha", "Cl"): 3, ("beta", "Cn"): 1}
+    (sentence,) = curvature(["ls", "iv-f1"], found, 20)
+    assert sentence.startswith(
+        "ls, iv-f1: the derivatives of Cl change with the angle of attack in 3 of 20 runs"
+    )
+    assert "--term alpha" in sentence
+    assert not list(curvature([], found, 20))
+    assert set(LATERAL_METHODS) - set(LINEAR) == {"filter-error"}
