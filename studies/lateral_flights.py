@@ -4,8 +4,8 @@ Variants of data/campaigns/lateral.toml are flown: surfaces at 3 deg in light an
 light turbulence; and data/campaigns/lateral_multisine.toml. The campaign in moderate turbulence has twice the runs of the others,
 as in the paper. Every method estimates each run with the measured dynamic pressure, in the first two campaigns with the constant
 one as well, and joint sets of four runs, of the multisine of one. The Cramer-Rao bound of a set is that of a linear aircraft
-(`studies.lateral_study`). `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables. An interrupted study
-continues.
+(`studies.lateral_study`). `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables, in short in OUT/page.md.
+An interrupted study continues.
 
     python -m studies.lateral_flights --out DIR [--runs N] [--jobs J] [--single] [--only NAME] [METHOD ...]
 """
@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from airtruth.aircraft import Aircraft, load
 from airtruth.identification import (
@@ -191,6 +192,50 @@ def terms_table(name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarra
     )
 
 
+def page(tables: Path, names: Sequence[str]) -> str:
+    """The tables of docs/lateral_tables.md: RelErr, RMSE and coverage of each campaign, then its means and deviations.
+
+    Parameters
+    ----------
+    tables : folder of the tables that `airtruth tables` writes.
+    names : of the campaigns.
+    """
+    rows, methods, parts = [], [], []
+    for name in names:
+        own = pd.read_csv(tables / f"lateral-{name}.csv").set_index(["statistic", "parameter"])
+        truth = own.loc["true", "value"]
+        every = (
+            own[own["method"] != "truth"]
+            .reset_index()
+            .set_index(["method", "statistic", "parameter"])["value"]
+        )
+        methods = list(dict.fromkeys(every.index.get_level_values(0)))
+        each = {
+            "RelErr": [f"{every[m, 'relerr_pct', 'twelve']:.2f}" for m in methods],
+            "RMSE": [
+                f"{100.0 * np.exp(np.mean([np.log(every[m, 'rmse', p] / abs(truth[p])) for p in LATERAL.scored])):.1f}"
+                for m in methods
+            ],
+            "coverage": [
+                f"{np.mean([every[m, 'coverage_pct', p] for p in LATERAL.parameters]):.0f}" for m in methods
+            ],
+        }
+        rows += [(name, figure, *cells) for figure, cells in each.items()]
+        text = (tables / f"lateral-{name}.md").read_text(encoding="utf-8")
+        kept = [
+            line
+            for line in text.partition("**Root mean square error")[0].splitlines()
+            if "&emsp;" not in line
+        ]
+        parts.append("\n".join(kept[:-1] if kept[-1].startswith("| ") and "**" in kept[-1] else kept))
+    head = flat(
+        "RelErr and RMSE of twelve derivatives, coverage of fifteen [%]",
+        ("campaign", "figure", *methods),
+        rows,
+    )
+    return "\n\n".join([as_markdown(head), *parts]) + "\n"
+
+
 def main() -> None:
     """Fly, estimate, print and write the tables."""
     parser = argparse.ArgumentParser(
@@ -217,6 +262,9 @@ def main() -> None:
         if name.startswith("light"):
             print(as_markdown(terms_table(name, own, gtm, truth)), flush=True)
     print(write_tables(folders, asked.out / "tables").text)
+    (asked.out / "page.md").write_text(
+        page(asked.out / "tables", [f.name for f in folders]), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":
