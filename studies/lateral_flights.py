@@ -58,7 +58,7 @@ CONSTANT = ("light-3", "moderate-3")
 """Campaigns that are identified with a constant dynamic pressure as well."""
 GUSTS = {"light": 1.0, "moderate": 2.0}
 """Level of the turbulence -> its gusts over the light ones."""
-MEASURED_BOUND = 8
+BOUND_RUNS = 8
 """Runs whose mean information makes the bound: they differ by the sign and size of their surfaces alone."""
 TERMS = ((), ("beta",), ("alpha",), ("alpha", "beta"))
 WITH_TERMS = ("ls", "filter-error")
@@ -142,7 +142,7 @@ def joint(
 def least_deviations(own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray, level: float) -> np.ndarray:
     """(15,) Cramer-Rao bound from one run, by the mean information of a few [% of the truth]."""
     values = lateral_values(gtm)
-    information = [np.linalg.inv(least_covariance(one, values, truth, level)) for one in own[:MEASURED_BOUND]]
+    information = [np.linalg.inv(least_covariance(one, values, truth, level)) for one in own[:BOUND_RUNS]]
     return 100.0 * np.sqrt(np.diag(np.linalg.inv(np.mean(information, axis=0)))) / np.abs(truth)
 
 
@@ -224,10 +224,10 @@ def page(tables: Path, names: Sequence[str]) -> str:
         text = (tables / f"lateral-{name}.md").read_text(encoding="utf-8")
         kept = [
             line
-            for line in text.partition("**Root mean square error")[0].splitlines()
+            for line in text.partition("| **Root mean square error")[0].splitlines()
             if "&emsp;" not in line
         ]
-        parts.append("\n".join(kept[:-1] if kept[-1].startswith("| ") and "**" in kept[-1] else kept))
+        parts.append("\n".join(kept))
     head = flat(
         "RelErr and RMSE of twelve derivatives, coverage of fifteen [%]",
         ("campaign", "figure", *methods),
