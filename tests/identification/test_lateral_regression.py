@@ -12,7 +12,7 @@ from airtruth.identification.estimates import Status, quantities
 from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
 from airtruth.identification.lateral.methods import LINEAR
 from airtruth.identification.lateral.observation import observe
-from airtruth.identification.lateral.problems import ls_problem, rate_of, smoothed
+from airtruth.identification.lateral.problems import grow_less, ls_problem, rate_of, smoothed
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
 from airtruth.identification.options import TERMS, Options
 from airtruth.numerics.prefilter import butterworth, edge_samples
@@ -249,3 +249,12 @@ def test_methods_whose_intervals_leave_out_a_nonlinear_term_are_named():
     assert "--term alpha" in sentence
     assert not list(curvature([], found, 20))
     assert set(LATERAL_METHODS) - set(LINEAR) == {"filter-error"}
+
+
+def test_bounded_motions_are_those_of_the_eigenvalues():
+    rng = np.random.default_rng(6)
+    a = rng.standard_normal((4000, 4, 4)) * np.exp(rng.standard_normal((4000, 1, 1))) - 1.5 * np.eye(4)
+    largest = np.linalg.eigvals(a).real.max(axis=1)
+    np.testing.assert_array_equal(grow_less(a, 0.7), largest < 0.7)
+    assert 0.2 < (largest < 0.7).mean() < 0.8
+    assert not grow_less(np.full((1, 4, 4), np.nan), 0.7).any()
