@@ -1,11 +1,13 @@
 """The lateral estimators on flights of the GTM's tables in JSBSim: tables as the paper's, coverage, nonlinear terms.
 
 Variants of data/campaigns/lateral.toml are flown: surfaces at 3 deg in light and moderate turbulence, and at 3 to 4 deg in
-light turbulence. The campaign in moderate turbulence has twice the runs of the others, as in the paper. Every method estimates
-each run with the measured dynamic pressure, in the first two campaigns with the constant one as well, and joint sets of four
-runs. `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables. An interrupted study continues.
+light turbulence; and data/campaigns/lateral_multisine.toml. The campaign in moderate turbulence has twice the runs of the others,
+as in the paper. Every method estimates each run with the measured dynamic pressure, in the first two campaigns with the constant
+one as well, and joint sets of four runs, of the multisine of one. The Cramer-Rao bound of a set is that of a linear aircraft
+(`studies.lateral_study`). `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables, in short in OUT/page.md.
+An interrupted study continues.
 
-    python -m studies.lateral_flights --out DIR [--runs N] [--jobs J] [--single] [METHOD ...]
+    python -m studies.lateral_flights --out DIR [--runs N] [--jobs J] [--single] [--only NAME] [METHOD ...]
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from airtruth.aircraft import Aircraft, load
 from airtruth.identification import (
@@ -30,6 +33,7 @@ from airtruth.identification import (
     identify_joint,
     write_estimates,
 )
+from airtruth.identification.lateral.methods import lateral_values
 from airtruth.logs.flight_log import Batch, batches
 from airtruth.logs.sources import log_files
 from airtruth.logs.store import read_log, read_table
@@ -38,19 +42,24 @@ from airtruth.reporting import write_tables
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.table import Table, as_markdown, flat
+from studies.lateral_study import least_covariance
 
 ROOT = Path(__file__).resolve().parents[1]
-CAMPAIGN = ROOT / "data" / "campaigns" / "lateral.toml"
+CAMPAIGNS = ROOT / "data" / "campaigns"
 FLOWN = {
-    "light-3": ((3.0, 3.0), "light", 1),
-    "moderate-3": ((3.0, 3.0), "moderate", 2),
-    "light": ((3.0, 4.0), "light", 1),
+    "light-3": ((3.0, 3.0), "light", 1, 4),
+    "moderate-3": ((3.0, 3.0), "moderate", 2, 4),
+    "light": ((3.0, 4.0), "light", 1, 4),
+    "multisine": (None, "light", 1, 1),
 }
-"""Name -> least and largest deflection [deg], level of the turbulence, runs over those asked for."""
+"""Name -> least and largest deflection [deg], None for the multisine; level of the turbulence, runs over those asked for, runs of
+a joint estimate."""
 CONSTANT = ("light-3", "moderate-3")
 """Campaigns that are identified with a constant dynamic pressure as well."""
-SET = 4
-"""Runs of a joint estimate."""
+GUSTS = {"light": 1.0, "moderate": 2.0}
+"""Level of the turbulence -> its gusts over the light ones."""
+BOUND_RUNS = 8
+"""Runs whose mean information makes the bound: they differ by the sign and size of their surfaces alone."""
 TERMS = ((), ("beta",), ("alpha",), ("alpha", "beta"))
 WITH_TERMS = ("ls", "filter-error")
 """Methods in the table of nonlinear terms."""
@@ -61,17 +70,22 @@ SCORED = [LATERAL.index(name) for name in LATERAL.scored]
 
 def fly(name: str, out: Path, runs: int, jobs: int) -> Path:
     """Fly a campaign into OUT/NAME; return its folder."""
-    (low, high), level, share = FLOWN[name]
-    text = CAMPAIGN.read_text(encoding="utf-8")
-    text = re.sub(
-        r"\{ low = 3.0, high = 4.0 \}", f"{{ low = {low}, high = {high} }}" if low < high else f"{low}", text
-    )
-    text = re.sub(
-        r"\{ low = -4.0, high = -3.0 \}",
-        f"{{ low = {-high}, high = {-low} }}" if low < high else f"{-low}",
-        text,
-    )
-    text = text.replace('name = "lateral"', f'name = "{name}"').replace(
+    deflections, level, share, _ = FLOWN[name]
+    file = CAMPAIGNS / ("lateral_multisine.toml" if deflections is None else "lateral.toml")
+    text = file.read_text(encoding="utf-8")
+    if deflections is not None:
+        low, high = deflections
+        text = re.sub(
+            r"\{ low = 3.0, high = 4.0 \}",
+            f"{{ low = {low}, high = {high} }}" if low < high else f"{low}",
+            text,
+        )
+        text = re.sub(
+            r"\{ low = -4.0, high = -3.0 \}",
+            f"{{ low = {-high}, high = {-low} }}" if low < high else f"{-low}",
+            text,
+        )
+    text = re.sub(r'(?m)^name = "\w+"$', f'name = "{name}"', text).replace(
         'level = "light"', f'level = "{level}"'
     )
     out.mkdir(parents=True, exist_ok=True)
@@ -117,27 +131,45 @@ def errors(made: Sequence[Estimates], truth: np.ndarray) -> tuple[np.ndarray, np
     return 100.0 * off / np.abs(truth), np.abs(off) <= 1.96 * std
 
 
-def joint(own: Sequence[Batch], gtm: Aircraft, method: str, options: Options) -> Iterator[Estimates]:
-    """Estimates of sets of `SET` runs."""
-    for first in range(0, len(own) - SET + 1, SET):
-        yield identify_joint(own[first : first + SET], gtm, method, options, LATERAL)
+def joint(
+    own: Sequence[Batch], gtm: Aircraft, method: str, options: Options, size: int
+) -> Iterator[Estimates]:
+    """Estimates of sets of runs."""
+    for first in range(0, len(own) - size + 1, size):
+        yield identify_joint(own[first : first + size], gtm, method, options, LATERAL)
+
+
+def least_deviations(own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray, level: float) -> np.ndarray:
+    """(15,) Cramer-Rao bound from one run, by the mean information of a few [% of the truth]."""
+    values = lateral_values(gtm)
+    information = [np.linalg.inv(least_covariance(one, values, truth, level)) for one in own[:BOUND_RUNS]]
+    return 100.0 * np.sqrt(np.diag(np.linalg.inv(np.mean(information, axis=0)))) / np.abs(truth)
 
 
 def joint_table(
     name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray, methods: Sequence[str]
 ) -> Table:
-    """RMSE of joint estimates [% of the truth], coverage of single runs and of joint sets."""
+    """RMSE of joint estimates [% of the truth], over the bound, coverage of single runs and of joint sets."""
     rows = []
+    size = FLOWN[name][-1]
+    least = least_deviations(own, gtm, truth, GUSTS[FLOWN[name][1]]) / np.sqrt(size)
     for method in methods:
         for options in (Options(), Options(terms=("alpha", "beta"))):
             single = errors([identify_batch(one, gtm, method, options, LATERAL) for one in own], truth)[1]
-            error, hits = errors(list(joint(own, gtm, method, options)), truth)
+            error, hits = errors(list(joint(own, gtm, method, options, size)), truth)
             rmse = np.sqrt((error**2).mean(axis=0))
             label = f"{method}{', terms' if options.terms else ''}"
-            shares = [f"{100.0 * x.mean():.0f}" for x in (single, hits)]
+            shares = [f"{np.exp(np.log(rmse / least).mean()):.2f}"]
+            shares += [f"{100.0 * x.mean():.0f}" for x in (single, hits)]
             rows.append((label, *(f"{rmse[j]:.1f}" for j in SCORED), *shares))
-    columns = ("method", *LATERAL.scored, "coverage, single [%]", f"coverage, {SET} runs [%]")
-    return flat(f"{name}: RMSE of joint estimates of {SET} runs [%]", columns, rows)
+    columns = (
+        "method",
+        *LATERAL.scored,
+        "over the bound",
+        "coverage, single [%]",
+        f"coverage, {size} runs [%]",
+    )
+    return flat(f"{name}: RMSE of joint estimates of {size} runs [%]", columns, rows)
 
 
 def terms_table(name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray) -> Table:
@@ -160,6 +192,50 @@ def terms_table(name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarra
     )
 
 
+def page(tables: Path, names: Sequence[str]) -> str:
+    """The tables of docs/lateral_tables.md: RelErr, RMSE and coverage of each campaign, then its means and deviations.
+
+    Parameters
+    ----------
+    tables : folder of the tables that `airtruth tables` writes.
+    names : of the campaigns.
+    """
+    rows, methods, parts = [], [], []
+    for name in names:
+        own = pd.read_csv(tables / f"lateral-{name}.csv").set_index(["statistic", "parameter"])
+        truth = own.loc["true", "value"]
+        every = (
+            own[own["method"] != "truth"]
+            .reset_index()
+            .set_index(["method", "statistic", "parameter"])["value"]
+        )
+        methods = list(dict.fromkeys(every.index.get_level_values(0)))
+        each = {
+            "RelErr": [f"{every[m, 'relerr_pct', 'twelve']:.2f}" for m in methods],
+            "RMSE": [
+                f"{100.0 * np.exp(np.mean([np.log(every[m, 'rmse', p] / abs(truth[p])) for p in LATERAL.scored])):.1f}"
+                for m in methods
+            ],
+            "coverage": [
+                f"{np.mean([every[m, 'coverage_pct', p] for p in LATERAL.parameters]):.0f}" for m in methods
+            ],
+        }
+        rows += [(name, figure, *cells) for figure, cells in each.items()]
+        text = (tables / f"lateral-{name}.md").read_text(encoding="utf-8")
+        kept = [
+            line
+            for line in text.partition("| **Root mean square error")[0].splitlines()
+            if "&emsp;" not in line
+        ]
+        parts.append("\n".join(kept))
+    head = flat(
+        "RelErr and RMSE of twelve derivatives, coverage of fifteen [%]",
+        ("campaign", "figure", *methods),
+        rows,
+    )
+    return "\n\n".join([as_markdown(head), *parts]) + "\n"
+
+
 def main() -> None:
     """Fly, estimate, print and write the tables."""
     parser = argparse.ArgumentParser(
@@ -169,11 +245,12 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--single", action="store_true", help="the tables of single runs alone")
+    parser.add_argument("--only", choices=tuple(FLOWN), help="one campaign")
     parser.add_argument("methods", nargs="*", default=list(LATERAL_METHODS))
     asked = parser.parse_args()
     gtm = load(ROOT / "aircraft" / "gtm")
     folders: list[Path] = []
-    for name in CONSTANT if asked.single else FLOWN:
+    for name in (asked.only,) if asked.only else CONSTANT if asked.single else FLOWN:
         folder = fly(name, asked.out, asked.runs, asked.jobs)
         folders += estimate(folder, gtm, asked.methods)
         if asked.single:
@@ -185,6 +262,9 @@ def main() -> None:
         if name.startswith("light"):
             print(as_markdown(terms_table(name, own, gtm, truth)), flush=True)
     print(write_tables(folders, asked.out / "tables").text)
+    (asked.out / "page.md").write_text(
+        page(asked.out / "tables", [f.name for f in folders]), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -37,24 +37,28 @@ def flown(runs: int, level: float, seconds: float):
     ]
 
 
-def deviations_of_the_bound(level: float, seconds: float):
-    """(15,) least standard deviations of unbiased estimates from one record."""
-    batch = fly(1, seconds, noise=0.0)
+def least_covariance(batch, constants, theta: np.ndarray, level: float) -> np.ndarray:
+    """(15, 15) bound from the first run of a batch; gust, sensor noise and biases unknown, no noise of p' and r'."""
     gusts = level > 0.0
-    data = records_of(batch, GTM, Options(pressure="constant"), LIGHT[3], gusts=gusts)
+    data = records_of(batch, constants, Options(pressure="constant"), LIGHT[3], gusts=gusts)
     channels = {output.name: output.channel for output in LATERAL.outputs}
     noise = [NOISE[channels[name]] for name in outputs_of(batch)]
     known = [level * LIGHT[1], *noise, *(1e-9 for _ in PROCESS)] if gusts else noise
-    count = len(THETA)
-    z = np.concatenate([THETA, np.log(known)])
+    count = len(theta)
+    z = np.concatenate([theta, np.log(known)])
     names = levels(outputs_of(batch), gusts=gusts)
     free = np.array([*range(count), *(count + i for i, name in enumerate(names) if name not in PROCESS)])
     n = data.layout.sizes[0]
     start = np.zeros((n, n))
     if gusts:
         start[4:, 4:] = [[1.0, 0.5], [0.5, 0.5]]
-    covariance = bound(data.layout, 0, z, free, data.signals, data.dt_s, start, np.arange(4))
-    return np.sqrt(np.diag(covariance)[:count])
+    made = bound(data.layout, 0, z, free, data.signals, data.dt_s, start, np.arange(4))
+    return made[:count, :count]
+
+
+def deviations_of_the_bound(level: float, seconds: float):
+    """(15,) least standard deviations of unbiased estimates from one record."""
+    return np.sqrt(np.diag(least_covariance(fly(1, seconds, noise=0.0), GTM, THETA, level)))
 
 
 def estimated(batches, method: str, options: Options) -> tuple[Estimates, float]:

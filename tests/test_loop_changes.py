@@ -10,8 +10,8 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.histories import Histories, History
 from airtruth.loop import loop_table
 from airtruth.loop.changes import changes_of, quantile
-from airtruth.loop.same_inputs import simulated_logs
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.loop.same_inputs import inputs_of, simulated_logs
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.table import as_text
 from airtruth.tracing.answer import Derivatives
 
@@ -114,3 +114,11 @@ def test_simulated_records_have_measured_inputs_and_simulated_outputs():
     assert list(only.channels) == ["elevator_rad", "alpha_rad"]
     assert only.channels["alpha_rad"].tolist() == [5.0, 6.0, 7.0, 8.0]
     assert only.channels["elevator_rad"].tolist() == [8.0, 9.0, 10.0, 11.0]
+
+
+def test_a_lateral_simulation_has_the_channels_that_every_log_needs():
+    """A log without the elevator and the vertical acceleration breaks the log contract, and has no estimate."""
+    inputs = inputs_of(LATERAL)
+    assert {"elevator_rad", "az_m_s2", "alpha_rad", "q_rad_s", "aileron_rad", "rudder_rad"} <= set(inputs)
+    assert not {output.channel for output in LATERAL.outputs} & set(inputs)
+    assert not {"az_m_s2", "alpha_rad", "q_rad_s", "theta_rad"} & set(inputs_of(LONGITUDINAL))

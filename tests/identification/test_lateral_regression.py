@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from airtruth.identification import identify_batch
+from airtruth.identification import LATERAL_METHODS, identify_batch
+from airtruth.identification.doubts import curvature
 from airtruth.identification.estimates import Status, quantities
 from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
+from airtruth.identification.lateral.methods import LINEAR
 from airtruth.identification.lateral.observation import observe
-from airtruth.identification.lateral.problems import ls_problem, rate_of, smoothed
+from airtruth.identification.lateral.problems import grow_less, ls_problem, rate_of, smoothed
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
 from airtruth.identification.options import TERMS, Options
 from airtruth.numerics.prefilter import butterworth, edge_samples
@@ -203,6 +205,7 @@ def test_terms_are_columns_of_an_independent_least_squares():
     made = regress_batch(batch, GTM, "ls", None, Options(terms=("alpha", "beta")))
     order = butter(4, 5.0, fs=1.0 / batch.dt_s, output="sos")
     pad = edge_samples(butterworth(5.0, 4, batch.dt_s))
+    first = round(1.0 / batch.dt_s)
     for run in range(3):
         x, y = independent(batch, run)
         c = {name: values[run] for name, values in batch.channels.items()}
@@ -210,7 +213,7 @@ def test_terms_are_columns_of_an_independent_least_squares():
         half = GTM.span_m / (2 * speed)
         columns = [c["beta_rad"], c["p_rad_s"] * half, c["r_rad_s"] * half, c["aileron_rad"], c["rudder_rad"]]
         columns = [column - column[0] for column in columns]
-        more = [column * (c["alpha_rad"] - c["alpha_rad"].mean()) for column in columns]
+        more = [column * (c["alpha_rad"] - c["alpha_rad"][:first].mean()) for column in columns]
         more.append(columns[0] * np.abs(columns[0]))
         x = np.column_stack([x, *(sosfiltfilt(order, m, padtype="odd", padlen=pad)[2:-2] for m in more)])
         expected = np.linalg.lstsq(x, y, rcond=None)[0][:5].T.ravel()
@@ -235,3 +238,23 @@ def test_straight_coefficients_show_no_terms():
     p = p_values(batch, GTM, Options())
     assert (p < 0.05).mean() < 0.09
     assert not (p < SIGNIFICANT).any()
+
+
+def test_methods_whose_intervals_leave_out_a_nonlinear_term_are_named():
+    found = {("alpha", "Cl"): 3, ("beta", "Cn"): 1}
+    (sentence,) = curvature(["ls", "iv-f1"], found, 20)
+    assert sentence.startswith(
+        "ls, iv-f1: the derivatives of Cl change with the angle of attack in 3 of 20 runs"
+    )
+    assert "--term alpha" in sentence
+    assert not list(curvature([], found, 20))
+    assert set(LATERAL_METHODS) - set(LINEAR) == {"filter-error"}
+
+
+def test_bounded_motions_are_those_of_the_eigenvalues():
+    rng = np.random.default_rng(6)
+    a = rng.standard_normal((4000, 4, 4)) * np.exp(rng.standard_normal((4000, 1, 1))) - 1.5 * np.eye(4)
+    largest = np.linalg.eigvals(a).real.max(axis=1)
+    np.testing.assert_array_equal(grow_less(a, 0.7), largest < 0.7)
+    assert 0.2 < (largest < 0.7).mean() < 0.8
+    assert not grow_less(np.full((1, 4, 4), np.nan), 0.7).any()

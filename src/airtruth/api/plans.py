@@ -10,7 +10,7 @@ from airtruth.api.campaigns import campaign_of
 
 if TYPE_CHECKING:
     from airtruth.api.arguments import FilePath
-    from airtruth.design import ForecastResult, LateralPlan, Limits, NarrowResult, SplitResult
+    from airtruth.design import ForecastResult, LateralPlan, LateralSplit, Limits, NarrowResult, SplitResult
     from airtruth.simulation.campaign.file import Campaign
 
 
@@ -36,7 +36,7 @@ def plan(
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> SplitResult: ...
+) -> SplitResult | LateralSplit: ...
 
 
 @overload
@@ -65,7 +65,7 @@ def plan(
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> SplitResult | NarrowResult | LateralPlan: ...
+) -> SplitResult | NarrowResult | LateralPlan | LateralSplit: ...
 
 
 def plan(
@@ -83,7 +83,7 @@ def plan(
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> ForecastResult | SplitResult | NarrowResult | LateralPlan:
+) -> ForecastResult | SplitResult | NarrowResult | LateralPlan | LateralSplit:
     """Predict the standard errors of a campaign (Cramer-Rao bound), or compute the flight that answers a question best.
 
     Parameters
@@ -107,7 +107,7 @@ def plan(
 
     Returns
     -------
-    ForecastResult, SplitResult, NarrowResult or LateralPlan
+    ForecastResult, SplitResult, NarrowResult, LateralPlan or LateralSplit
         The first of a campaign; the campaigns of the others, ``campaign``, can be flown.
 
     Raises

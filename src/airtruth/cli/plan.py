@@ -158,7 +158,7 @@ def plan(
         forecasts = _forecasts(campaign, records, pressure, motion, quiet)
         print_result(_json(forecasts) if json_ else _text(forecasts))
         return
-    _require_motion(motion, _listed("--derivative", derivative), split)
+    _require_motion(motion, _listed("--derivative", derivative))
     stated = Request(
         _listed("--split", split), _sizes(size or []), _listed("--derivative", derivative), trace
     )
@@ -170,9 +170,9 @@ def plan(
     print_result(json.dumps(result.to_dict(), indent=1) if json_ else result.summary())
 
 
-def _require_motion(motion: MotionName | None, derivatives: list[str], split: str | None) -> None:
-    """Refuse a motion that has not the derivatives, or none of whose inputs separates effects."""
-    from airtruth.physics.motion import LATERAL, MOTIONS
+def _require_motion(motion: MotionName | None, derivatives: list[str]) -> None:
+    """Refuse a motion that has not the derivatives."""
+    from airtruth.physics.motion import MOTIONS
 
     if motion is None:
         return
@@ -180,11 +180,6 @@ def _require_motion(motion: MotionName | None, derivatives: list[str], split: st
     if others:
         raise ConfigurationError(
             f"plan: --motion {motion} has no derivative {others[0]!r}; it has {', '.join(MOTIONS[motion].parameters)}"
-        )
-    if split is not None and motion == LATERAL.name:
-        raise ConfigurationError(
-            "plan: --split computes an input of the elevator; for lateral effects fly what `airtruth effects NAME` states under "
-            "'distinguished by', or determine a derivative with --derivative NAME"
         )
 
 

@@ -4,6 +4,7 @@ from airtruth.design.band import BandQuestion
 from airtruth.design.bound import ForecastResult, forecast, moved_motions
 from airtruth.design.flight import PlanOptions
 from airtruth.design.lateral_flight import LateralPlan
+from airtruth.design.lateral_splitting import LateralSplit
 from airtruth.design.limits import Limits
 from airtruth.design.narrow_result import NarrowResult
 from airtruth.design.narrowing import narrow
@@ -16,6 +17,7 @@ __all__ = [
     "DerivativeQuestion",
     "ForecastResult",
     "LateralPlan",
+    "LateralSplit",
     "Limits",
     "NarrowResult",
     "PlanOptions",

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from airtruth.design.bench import Flown
 from airtruth.design.question import Hypothesised, typical_sizes
 from airtruth.design.separation import Distance, Experiment, FilterSetting, Member
-from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import TraceRecord
 
 Array = NDArray[np.float64]
@@ -63,14 +62,18 @@ class Criterion:
         return replace(self, model=replace(self.model, records=records))
 
     def rate(self, flown: Flown, *, final: bool = False) -> Array | None:
+        """`separations` by an input."""
+        return self.separations(flown.record, final=final)
+
+    def separations(self, record: TraceRecord, *, final: bool = False) -> Array | None:
         """(members,) separation of each truth from the nearest rival, averaged over draws; None if a motion is lost.
 
         Parameters
         ----------
-        flown : the input.
+        record : of an input, as flown by the declared aircraft.
         final : use all draws, not the first two.
         """
-        experiment = Experiment(self.model, flown.record)
+        experiment = Experiment(self.model, record)
         if not experiment.sound:
             return None
         unknowns = self.unknowns if final else self.unknowns[:_FIRST]
@@ -95,9 +98,11 @@ class Criterion:
         ]
 
     def differences(self, record: TraceRecord) -> tuple[Array, Array]:
-        """Predicted outputs (samples, 3) under the first hypothesis, and under its nearest rival at its best-fitting size."""
-        experiment = Experiment(self.model, record)
-        still = np.zeros(SHORT_PERIOD.common.size)
+        """Predicted outputs under the first hypothesis, and under its nearest rival at its best-fitting size.
+
+        Each is (samples, outputs).
+        """
+        experiment, still = Experiment(self.model, record), self.model.still
         y = experiment.outputs(self.members[0], still)
         tried = [(m, experiment.distance(y, m.effect, m.sizes, still)) for m in self.members[1:]]
         rival, nearest = min(tried, key=lambda pair: pair[1].sigma)
@@ -116,15 +121,14 @@ def criterion(
     Parameters
     ----------
     reference : record on which they imitate it.
-    covariance : (6, 6) of the increments of the derivatives [-].
+    covariance : (derivatives, derivatives) of the increments of the derivatives [-].
     seed : seed of the draws.
     """
     first = hypotheses[0]
     assert first.sizes is not None
     assert first.std is not None
     leader = first.member(first.sizes)
-    experiment = Experiment(model, reference)
-    still = np.zeros(SHORT_PERIOD.common.size)
+    experiment, still = Experiment(model, reference), model.still
     y = experiment.outputs(leader, still)
     relative = float(first.std[0] / abs(first.sizes[0])) if first.sizes[0] else 0.0
     members, std = [leader], [first.std]
@@ -138,8 +142,8 @@ def criterion(
     unknowns = []
     for _ in range(DRAWS // 2):
         sizes = np.clip(rng.standard_normal(1), -_MOST_SIZES, _MOST_SIZES)
-        common = np.zeros(SHORT_PERIOD.common.size)
-        common[SHORT_PERIOD.common.derivatives] = root @ rng.standard_normal(6)
+        common = model.still
+        common[model.layout.common.derivatives] = root @ rng.standard_normal(len(root))
         unknowns += [Unknown(sizes, common), Unknown(-sizes, -common)]
     return Criterion(model, tuple(members), tuple(std), tuple(unknowns))
 
@@ -150,7 +154,7 @@ def _imitation(experiment: Experiment, y: Array, h: Hypothesised) -> Array:
     Where the best fit is immaterial the effect does not imitate these outputs, and its typical size counts: at the neutral
     value it would be no effect, from which no input separates another.
     """
-    still = np.zeros(SHORT_PERIOD.common.size)
+    still = experiment.model.still
     tried: list[Distance] = []
     for start in _starts(h):
         tried.append(experiment.distance(y, h.effect, start, still))

@@ -19,6 +19,7 @@ from airtruth.design.limits import Limits
 from airtruth.design.separation import FilterSetting
 from airtruth.errors import AirtruthError, ConfigurationError
 from airtruth.physics.gust_figures import GustScales, gust_scales
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.simulation.campaign.file import NO_GUST, Campaign, ConditionTable
 from airtruth.simulation.campaign.manoeuvre_table import ManoeuvreTable
 from airtruth.simulation.campaign.tables import Choice, Constant, Distribution, Normal, Uniform
@@ -185,19 +186,22 @@ def gusts(campaign: Campaign, at: Condition) -> GustScales:
     )
 
 
-def model_of(aircraft: Aircraft, campaign: Campaign, at: Condition, records: int) -> FilterSetting:
+def model_of(
+    aircraft: Aircraft, campaign: Campaign, at: Condition, records: int, motion: Motion = LONGITUDINAL
+) -> FilterSetting:
     """The tracer's filter for flights to come: sensors of a campaign, its gusts at a condition, and equal records.
 
     Parameters
     ----------
     records : records that are fitted together.
+    motion : of the records; the lateral gusts are as strong as the vertical ones.
     """
     sensors = campaign.sensors.apply(aircraft.file.sensors)
     file = aircraft.file.model_copy(update={"sensors": sensors})
     flown_with = aircraft.model_copy(update={"file": file})
     return FilterSetting(
-        settings=settings_of(flown_with, _THRUST_STD),
-        declared=declared_change(flown_with),
+        settings=settings_of(flown_with, _THRUST_STD, motion),
+        declared=declared_change(flown_with, motion),
         gust_m_s=gusts(campaign, at).sigma_w_m_s,
         records=records,
     )

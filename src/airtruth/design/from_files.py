@@ -14,10 +14,11 @@ from airtruth import style
 from airtruth.aircraft import Aircraft
 from airtruth.design.flight import PlanOptions
 from airtruth.design.lateral_flight import LateralPlan, LateralQuestion, plan_lateral
+from airtruth.design.lateral_splitting import LateralSplit, split_lateral
 from airtruth.design.narrow_result import NarrowResult
 from airtruth.design.narrowing import narrow
 from airtruth.design.precision import DerivativeQuestion
-from airtruth.design.question import from_names
+from airtruth.design.question import from_names, motion_of, tied_in
 from airtruth.design.split_result import SplitResult
 from airtruth.design.splitting import split
 from airtruth.design.verdict import Asked, asked_by, least_known
@@ -71,7 +72,7 @@ def planned_from(
     *,
     force: bool = False,
     step: Step = lambda text: None,
-) -> SplitResult | NarrowResult | LateralPlan:
+) -> SplitResult | NarrowResult | LateralPlan | LateralSplit:
     """Plan the flight that answers a question, or the question that a trace leaves open.
 
     Parameters
@@ -101,9 +102,11 @@ def planned_from(
         if out is not None:
             outputs.require(out, out.with_suffix(".png"))
             make_folder(location(out).parent)
-        result: SplitResult | NarrowResult | LateralPlan
+        result: SplitResult | NarrowResult | LateralPlan | LateralSplit
         if isinstance(question, LateralQuestion):
             result = plan_lateral(base, question, options.limits.amplitude_rad, options.records, step)
+        elif isinstance(question, tuple) and motion_of([h.effect for h in question]) is LATERAL:
+            result = split_lateral(base, question, options, declared, step)
         elif isinstance(question, tuple):
             result = split(base, question, options, declared, step)
         else:
@@ -128,11 +131,9 @@ def _question(stated: Request, answer_file: Path | None) -> Asked | LateralQuest
     if stated.split or answer_file is None:
         return from_names(stated.split, stated.sizes)
     answer = TraceAnswer.read(answer_file)
-    return (
-        LateralQuestion((least_known(answer),))
-        if answer.motion is LATERAL
-        else asked_by(answer, str(answer_file))
-    )
+    if answer.motion is LATERAL:
+        return tied_in(answer) or LateralQuestion((least_known(answer),))
+    return asked_by(answer, str(answer_file))
 
 
 def _records(answer_file: Path | None) -> Histories | None:

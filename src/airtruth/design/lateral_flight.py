@@ -75,52 +75,61 @@ class LateralQuestion:
 
 @dataclass(frozen=True)
 class LateralInput:
-    """An input and what it determines.
+    """An input and what it answers.
 
     Attributes
     ----------
     kind : of both manoeuvres; steps_s : length of a step of each control [s].
-    std : (targets,) standard errors of one record [-].
+    values : of each quantity by which inputs are compared.
     """
 
     kind: str
     steps_s: tuple[float, float]
-    std: tuple[float, ...]
+    values: tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class LateralPlan:
-    """The planned flight; satisfies `airtruth.result.Result`.
+class LateralFlight:
+    """A planned lateral flight; satisfies `airtruth.result.Result`.
 
     Attributes
     ----------
     aircraft : name.
-    targets : derivatives.
-    declared : (targets,) declared values [-].
     campaign : flies the best input in both signs.
     inputs : best first.
     """
 
     aircraft: str
-    targets: tuple[str, ...]
-    declared: tuple[float, ...]
     campaign: Campaign
     inputs: tuple[LateralInput, ...]
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the values of an input."""
+        raise NotImplementedError
+
+    @property
+    def purpose(self) -> str:
+        """Verb and object of the title, behind "Lateral flight that"."""
+        raise NotImplementedError
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks below the table."""
+        raise NotImplementedError
+
     def table(self) -> Table:
-        """The inputs with the standard errors of one record, best first."""
+        """The inputs with their values, best first."""
         rows: list[Row] = [
-            (one.kind, *one.steps_s, *(Number(x, digits=3) for x in one.std)) for one in self.inputs
+            (one.kind, *one.steps_s, *(Number(x, digits=3) for x in one.values)) for one in self.inputs
         ]
         steps = (f"step of the {control.name} [s]" for control in LATERAL.controls)
         return flat(
-            f"Lateral flight that determines {', '.join(self.targets)} ({self.aircraft})",
-            ("manoeuvre", *steps, *(f"std of {name}" for name in self.targets)),
+            f"Lateral flight that {self.purpose} ({self.aircraft})",
+            ("manoeuvre", *steps, *self.columns),
             rows,
             (
-                f"Standard errors of one record, Cramer-Rao bound [{LATERAL.derivative_units}]; declared: "
-                + ", ".join(f"{n} {v:.4g}" for n, v in zip(self.targets, self.declared, strict=True))
-                + ".",
+                *self.notes,
                 "The amplitude is as stated; limits of the motion are not searched for, so compare the flown sideslip with what "
                 "the aircraft may do.",
             ),
@@ -136,36 +145,35 @@ class LateralPlan:
 
         return pd.DataFrame(
             [
-                {"kind": i.kind, "steps_s": i.steps_s, **dict(zip(self.targets, i.std, strict=True))}
+                {"kind": i.kind, "steps_s": i.steps_s, **dict(zip(self.columns, i.values, strict=True))}
                 for i in self.inputs
             ]
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Aircraft, campaign, targets and inputs."""
+        """Aircraft, campaign and inputs."""
         return {
             "aircraft": self.aircraft,
             "motion": LATERAL.name,
             "campaign": self.campaign.name,
             "records": self.campaign.runs,
-            "declared": dict(zip(self.targets, self.declared, strict=True)),
             "inputs": self.to_frame().to_dict("records"),
         }
 
     def plot(self) -> Figure:
-        """Standard errors of the inputs over those of the best [-]."""
+        """Values of the inputs over those of the best [-]."""
         from airtruth import style
 
         with style.applied():
             figure = style.new_figure(6.6, 3.4)
             ax = figure.subplots()
-            best = np.array(self.inputs[0].std)
+            best = np.array(self.inputs[0].values)
             at = np.arange(len(self.inputs))
-            for k, name in enumerate(self.targets):
-                ax.plot(at, [one.std[k] / best[k] for one in self.inputs], "o", label=name)
+            for k, name in enumerate(self.columns):
+                ax.plot(at, [one.values[k] / best[k] for one in self.inputs], "o", label=name)
             ax.set_xticks(at, [f"{i.kind}\n{i.steps_s[0]:g}, {i.steps_s[1]:g} s" for i in self.inputs])
             ax.tick_params(axis="x", labelsize=6)
-            ax.set_ylabel("standard error over the best input [-]")
+            ax.set_ylabel("relative to the best input [-]")
             style.legend_above(figure, [ax], self.table().title)
         return figure
 
@@ -177,8 +185,9 @@ class LateralPlan:
         StoreError
             If the file cannot be written.
         """
-        note = f"Lateral flight that determines {', '.join(self.targets)}, computed by airtruth plan."
-        write_text(out, as_toml(self.campaign, note))
+        write_text(
+            out, as_toml(self.campaign, f"Lateral flight that {self.purpose}, computed by airtruth plan.")
+        )
 
     def __repr__(self) -> str:
         """Return the first lines of the summary."""
@@ -186,6 +195,47 @@ class LateralPlan:
 
     def _repr_html_(self) -> str:
         return as_html(self.table())
+
+
+@dataclass(frozen=True, repr=False)
+class LateralPlan(LateralFlight):
+    """The flight that determines derivatives best; the values of an input are standard errors of one record.
+
+    Attributes
+    ----------
+    targets : derivatives.
+    declared : (targets,) declared values [-].
+    """
+
+    targets: tuple[str, ...]
+    declared: tuple[float, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Standard error of each derivative."""
+        return tuple(f"std of {name}" for name in self.targets)
+
+    @property
+    def purpose(self) -> str:
+        """The derivatives."""
+        return f"determines {', '.join(self.targets)}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The origin of the standard errors, and the declared values."""
+        declared = ", ".join(f"{n} {v:.4g}" for n, v in zip(self.targets, self.declared, strict=True))
+        units = LATERAL.derivative_units
+        return (f"Standard errors of one record, Cramer-Rao bound [{units}]; declared: {declared}.",)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Aircraft, campaign, inputs, and the declared values."""
+        return super().to_dict() | {"declared": dict(zip(self.targets, self.declared, strict=True))}
+
+
+def every_input() -> Iterator[tuple[str, tuple[float, float]]]:
+    """Pattern and length of a step of each control of the inputs that are compared."""
+    for kind, first, second in product(PATTERNS, *STEPS_S):
+        yield kind, (first, second)
 
 
 def plan_lateral(
@@ -211,21 +261,17 @@ def plan_lateral(
         As `airtruth.design.bound.forecast`.
     """
     found: list[tuple[LateralInput, ForecastResult]] = []
-    for kind, first, second in product(PATTERNS, *STEPS_S):
-        step(f"evaluate {kind} with steps of {first:g} and {second:g} s")
-        result = forecast(
-            with_input(base, kind, (first, second), amplitude_rad, 1), records=1, motion=LATERAL.name
-        )
+    for kind, steps_s in every_input():
+        step(f"evaluate {kind} with steps of {steps_s[0]:g} and {steps_s[1]:g} s")
+        result = forecast(with_input(base, kind, steps_s, amplitude_rad, 1), records=1, motion=LATERAL.name)
         at = [result.parameters.index(name) for name in question.names]
-        found.append(
-            (LateralInput(kind, (first, second), tuple(float(result.single[i]) for i in at)), result)
-        )
-    scale = np.array(found[0][0].std)
-    found.sort(key=lambda pair: float(np.mean((np.array(pair[0].std) / scale) ** 2)))
+        found.append((LateralInput(kind, steps_s, tuple(float(result.single[i]) for i in at)), result))
+    scale = np.array(found[0][0].values)
+    found.sort(key=lambda pair: float(np.mean((np.array(pair[0].values) / scale) ** 2)))
     best, result = found[0]
     declared = tuple(float(result.theta[result.parameters.index(name)]) for name in question.names)
     campaign = with_input(base, best.kind, best.steps_s, amplitude_rad, records or RECORDS)
-    return LateralPlan(result.aircraft, question.names, declared, campaign, tuple(one for one, _ in found))
+    return LateralPlan(result.aircraft, campaign, tuple(one for one, _ in found), question.names, declared)
 
 
 def with_input(
@@ -272,4 +318,13 @@ def _controls(kind: str, steps_s: tuple[float, float], amplitude_rad: float) -> 
         start += PATTERNS[kind] * step_s + _START_S
 
 
-__all__ = ["RECORDS", "LateralInput", "LateralPlan", "LateralQuestion", "plan_lateral", "with_input"]
+__all__ = [
+    "RECORDS",
+    "LateralFlight",
+    "LateralInput",
+    "LateralPlan",
+    "LateralQuestion",
+    "every_input",
+    "plan_lateral",
+    "with_input",
+]

@@ -15,9 +15,10 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.increment import NAME as INCREMENT
 from airtruth.effects.registry import EFFECTS, named
 from airtruth.errors import ConfigurationError
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import MOTIONS, Motion
 from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.tracing.answer import AcceptedEffect, TraceAnswer
+from airtruth.tracing.inference.causes import DERIVATIVES
 
 Array = NDArray[np.float64]
 
@@ -129,7 +130,7 @@ def _one_of(answer: TraceAnswer, name: str) -> list[str]:
 
 def is_separable(effect: Effect) -> bool:
     """Whether an input can separate an effect from others: no effect of the air, and not `derivatives`."""
-    return effect.where != "air" and effect.key != "derivatives"
+    return effect.where != "air" and effect.name != DERIVATIVES
 
 
 def _require(effects: Sequence[Effect]) -> None:
@@ -142,21 +143,33 @@ def _require(effects: Sequence[Effect]) -> None:
         raise ConfigurationError(
             f"plan: {len(keys)} effects ({', '.join(keys)}); state at most {MOST}, a variant as NAME:VARIANT"
         )
-    other = [e.key for e in effects if not e.applies_to(LONGITUDINAL)]
-    if other:
-        raise ConfigurationError(
-            f"plan: no elevator input shows {', '.join(other)}, which act on the lateral-directional motion; fly what `airtruth "
-            f"effects {other[0]}` states under 'distinguished by', or plan a lateral flight with --derivative Cnr"
-        )
+    motion_of(effects)
     air = [e.key for e in effects if e.where == "air"]
     if air:
         raise ConfigurationError(
-            f"plan: no elevator input shows {', '.join(air)}, which act on the gusts alone; state other effects"
+            f"plan: no input shows {', '.join(air)}, which act on the gusts alone; state other effects"
         )
-    if any(e.key == "derivatives" for e in effects):
+    if any(e.name == DERIVATIVES for e in effects):
         raise ConfigurationError(
             "plan: `derivatives` cannot be separated, because every hypothesis refits them; state another effect"
         )
+
+
+def motion_of(effects: Sequence[Effect]) -> Motion:
+    """The first motion on which all effects act.
+
+    Raises
+    ------
+    ConfigurationError
+        If none has all of them.
+    """
+    found = next((m for m in MOTIONS.values() if all(m.name in e.motions for e in effects)), None)
+    if found is None:
+        acting = "; ".join(f"{e.key} on the {' and '.join(e.motions)} motion" for e in effects)
+        raise ConfigurationError(
+            f"plan: no flight of one motion shows all effects ({acting}); state effects of one motion"
+        )
+    return found
 
 
 def estimated(accepted: AcceptedEffect) -> Hypothesised:
@@ -212,6 +225,7 @@ __all__ = [
     "estimated",
     "from_names",
     "is_separable",
+    "motion_of",
     "tied_in",
     "typical_sizes",
 ]

@@ -25,7 +25,7 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import Sensitivities, TraceProblem, sensitivities_of
-from airtruth.tracing.model.parameters import SHORT_PERIOD, Layout, Parameters
+from airtruth.tracing.model.parameters import Layout, ParameterLayout, Parameters
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.model.settings import Settings, initial_per_record
@@ -41,14 +41,6 @@ _HALVINGS: Final = 2
 """Times that a step which does not help is halved [-] (judgement)."""
 _SETTLED: Final = 0.01
 """Relative fall of d^2 below which the search ends [-] (judgement: half a percent of the separation)."""
-_FREE: Final = np.array(
-    [i for i in range(SHORT_PERIOD.common.colour.start) if i not in SHORT_PERIOD.common.noise]
-)
-"""Common parameters that are refitted: all but those of the noise, on which the mean of the innovations does not depend."""
-_OWN: Final = np.array(
-    [i for i in range(SHORT_PERIOD.per_record.size) if i != SHORT_PERIOD.per_record.log_gust]
-)
-"""Parameters of a record that are refitted: all but the gust level, likewise."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +70,7 @@ class FilterSetting:
     ----------
     settings : noise and priors of the sensors.
     declared : what aircraft.toml declares of sensors and dynamics.
-    gust_m_s : standard deviation of the vertical gust in the flights to come [m/s].
+    gust_m_s : standard deviation of the gust of the motion in the flights to come [m/s].
     records : number of equal records that are fitted together.
     """
 
@@ -87,14 +79,25 @@ class FilterSetting:
     gust_m_s: float
     records: int
 
+    @property
+    def layout(self) -> ParameterLayout:
+        """Parameters of the motion."""
+        return self.settings.layout
+
+    @property
+    def still(self) -> Array:
+        """(common,) parameters of the declared aircraft."""
+        return np.zeros(self.layout.common.size)
+
     def hypothesis(self, effects: Sequence[Effect], record: TraceRecord) -> Hypothesis:
         """The declared aircraft with some effects."""
-        return Hypothesis(self.declared, tuple(effects), trim_flow_rad=record.plant.trim_alpha_rad)
+        flow = float(record.plant.trim_signals[0])
+        return Hypothesis(self.declared, tuple(effects), trim_flow_rad=flow, motion=self.layout.motion)
 
     def own(self, record: TraceRecord) -> Array:
         """(per-record,) parameters of a flight in these gusts."""
         values = initial_per_record(record, self.settings)
-        values[SHORT_PERIOD.per_record.log_gust] = np.log(self.gust_m_s)
+        values[self.layout.per_record.log_gust] = np.log(self.gust_m_s)
         return values
 
 
@@ -123,13 +126,11 @@ class Experiment:
 
     def __init__(self, model: FilterSetting, record: TraceRecord) -> None:
         self.model = model
-        self.record = flown_by(
-            model, record, model.hypothesis((), record), np.zeros(0), np.zeros(SHORT_PERIOD.common.size)
-        )
+        self.record = flown_by(model, record, model.hypothesis((), record), np.zeros(0), model.still)
         problem = TraceProblem((self.record,), model.settings)
         self._problem = problem
         own = model.own(self.record)
-        point = Parameters(np.zeros(SHORT_PERIOD.common.size), own[None], np.zeros(0))
+        point = Parameters(model.still, own[None], np.zeros(0), model.layout)
         found = sensitivities_of(problem, 0, model.hypothesis((), self.record), point)
         self.sound = found is not None
         if found is None:
@@ -138,7 +139,7 @@ class Experiment:
         self._bases: dict[tuple[int, ...], Array] = {}
 
     def outputs(self, truth: Member, common: Array) -> Array:
-        """(samples, 3) outputs of the record that the tracer's model has with an effect, in calm air."""
+        """(samples, outputs) outputs of the record that the tracer's model has with an effect, in calm air."""
         hypothesis = self.model.hypothesis((truth.effect,), self.record)
         return flown_by(self.model, self.record, hypothesis, truth.sizes, common).signals.y
 
@@ -147,7 +148,7 @@ class Experiment:
 
         Parameters
         ----------
-        y : (samples, 3) outputs under the truth.
+        y : (samples, outputs) outputs under the truth.
         rival : effect of the other hypothesis; start : (parameters,) sizes at which its search begins.
         common : (common,) parameters of the aircraft under both hypotheses.
         """
@@ -209,7 +210,7 @@ def flown_by(
 
 
 def refitted(problem: TraceProblem, hypothesis: Hypothesis, found: Sensitivities, records: int) -> Array:
-    """Orthonormal basis (samples 3 + nuisance, nuisance) of what is refitted on equal records, priors as further rows.
+    """Orthonormal basis (samples * outputs + nuisance, nuisance) of what is refitted on equal records, priors as further rows.
 
     Parameters
     ----------
@@ -218,15 +219,17 @@ def refitted(problem: TraceProblem, hypothesis: Hypothesis, found: Sensitivities
     found : sensitivities of the record; those by sizes do not count.
     records : number of equal records that are fitted together.
     """
-    layout = Layout(SHORT_PERIOD, len(found.t) - SHORT_PERIOD.common.size - SHORT_PERIOD.per_record.size)
-    nuisance = np.concatenate([_FREE, layout.per_record.start + _OWN])
+    every, each = problem.layout.common, problem.layout.per_record
+    layout = Layout(problem.layout, len(found.t) - every.size - each.size)
+    # the mean of the innovations does not depend on the noise, nor on the level of the gusts
+    shared = np.setdiff1d(np.arange(every.colour.start), every.noise)
+    own = np.setdiff1d(np.arange(each.size), each.log_gust)
+    nuisance = np.concatenate([shared, layout.per_record.start + own])
     t = found.t[nuisance].reshape(len(nuisance), -1).T
     priors = problem.priors(hypothesis)
-    common = priors.common[np.ix_(_FREE, _FREE)] / records
-    own = priors.per_record[0][1][np.ix_(_OWN, _OWN)]
     rows = np.zeros((len(nuisance),) * 2)
-    rows[: len(_FREE), : len(_FREE)] = np.linalg.cholesky(common).T
-    rows[len(_FREE) :, len(_FREE) :] = np.linalg.cholesky(own).T
+    rows[: len(shared), : len(shared)] = np.linalg.cholesky(priors.common[np.ix_(shared, shared)] / records).T
+    rows[len(shared) :, len(shared) :] = np.linalg.cholesky(priors.per_record[0][1][np.ix_(own, own)]).T
     return np.asarray(np.linalg.qr(np.vstack([t, rows]))[0])
 
 

@@ -101,7 +101,7 @@ def _split(
     best = run(chosen.search, options.seed, step)
     step("rate the best inputs with all draws")
     finals, reference = chosen.finals(best.values())
-    records = options.records or _enough(finals[0].value)
+    records = options.records or enough_records(finals[0].value)
     if fitted_of(records) != chosen.search.criterion.model.records:
         chosen.search.criterion = chosen.search.criterion.of_records(fitted_of(records))
         finals, reference = chosen.finals(finals)
@@ -128,7 +128,7 @@ def _split(
     )
 
 
-def _enough(sigma: float) -> int:
+def enough_records(sigma: float) -> int:
     """Records that give one name with `ENOUGH` probability, where `LEAST_RECORDS` separate by ``sigma``."""
     first = fitted_of(LEAST_RECORDS)
     for records in range(LEAST_RECORDS, MOST_RECORDS):
@@ -217,4 +217,4 @@ def _prediction(judged: Criterion, flown: Flown, reference: Flown) -> Prediction
     )
 
 
-__all__ = ["reference_separation", "split"]
+__all__ = ["enough_records", "reference_separation", "split"]

@@ -128,11 +128,12 @@ def changing_pressure(
     )
 
 
-def curvature(curved: Mapping[tuple[str, str], int], runs: int) -> Iterator[str]:
+def curvature(methods: Sequence[str], curved: Mapping[tuple[str, str], int], runs: int) -> Iterator[str]:
     """Sentences about coefficients that are not linear in at least a share `SOME` of the records.
 
     Parameters
     ----------
+    methods : names of those whose intervals do not allow for it.
     curved : number of runs that show a term of a coefficient: (term, coefficient) -> runs.
     runs : number of all runs.
     """
@@ -141,11 +142,12 @@ def curvature(curved: Mapping[tuple[str, str], int], runs: int) -> Iterator[str]
         names = [
             name for (own, name), count in curved.items() if own == term and count >= max(SOME * runs, 1)
         ]
-        if names:
+        if names and methods:
             most = max(curved[term, name] for name in names)
             yield (
-                f"the derivatives of {' and '.join(names)} change {change}{_some(most, runs)}: the intervals of a linear model "
-                f"do not allow for that; --term {term} frees the change."
+                f"{', '.join(methods)}: the derivatives of {' and '.join(names)} change {change}{_some(most, runs)}. "
+                "The intervals of these estimates do not allow for it; use filter-error, or "
+                f"--term {term}, which frees the change."
             )
 
 

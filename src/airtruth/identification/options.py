@@ -70,8 +70,8 @@ class Options:
     confidence : probability of the intervals [-].
     auxiliary : model that makes the instruments; None is the linear short-period model.
     terms : nonlinear terms that are free in each lateral coefficient: "alpha", the products of the signals with the angle of
-        attack about its mean, and "beta", beta |beta|. They widen the intervals; the derivatives are then those at the
-        mean angle of attack and small sideslip.
+        attack, and "beta", beta |beta|. They widen the intervals; the derivatives are then those at the mean angle of attack
+        of the first ``trim_window_s`` and at small sideslip.
     """
 
     cutoff_hz: float | None = None

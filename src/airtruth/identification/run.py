@@ -23,6 +23,7 @@ from airtruth.identification.declared_sensors import declared_words, taken_out
 from airtruth.identification.doubts import changing_pressure, curvature, doubts, smoothed_airspeed
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.from_log import FromLog, LogTask, results_of
+from airtruth.identification.lateral.methods import LINEAR
 from airtruth.identification.loading import at_one_cg, mean_cg
 from airtruth.identification.methods import Method, chosen_methods
 from airtruth.identification.options import Options
@@ -292,7 +293,7 @@ class _Work:
             *_stated(self.stated),
             *smoothed_airspeed(self.noisy, self.runs),
             *changing_pressure(constant, self.changes, self.runs),
-            *curvature(self.curved, self.runs),
+            *curvature([m.name for m in self.methods if m.name in LINEAR], self.curved, self.runs),
         )
 
     def joint(self) -> Iterator[Estimates]:

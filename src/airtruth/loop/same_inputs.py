@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import REQUIRED
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.histories import Histories, History
 from airtruth.physics.motion import LONGITUDINAL, Motion, motion_with
@@ -29,7 +30,9 @@ def inputs_of(motion: Motion) -> tuple[str, ...]:
     """Channels that a simulated record takes from the measured one; other channels contain the measured motion."""
     controls = [name for c in motion.controls for name in (c.channel, c.command)]
     known = [name for name in motion.known if name not in _FLOWN.get(motion.name, ())]
-    return tuple(dict.fromkeys((*_ALWAYS, *controls, *known)))
+    outputs = {output.channel for output in motion.outputs}
+    of_every_log = [name for name in REQUIRED if name not in outputs]
+    return tuple(dict.fromkeys((*_ALWAYS, *controls, *known, *of_every_log)))
 
 
 def simulated_logs(logs: Sequence[FlightLog], histories: Histories, model: str) -> list[FlightLog]:

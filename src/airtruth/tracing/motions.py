@@ -11,6 +11,8 @@ from threadpoolctl import threadpool_limits
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
 from airtruth.checks.motions import missing_channels
+from airtruth.effects.effect import Effect
+from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
 from airtruth.identification.excited import excited_motions, excited_runs
 from airtruth.identification.record_constants import values_of
@@ -57,8 +59,8 @@ class MotionTrace:
 def parts_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> tuple[MotionTrace, ...]:
     """The motions to answer, in the order of the answers.
 
-    Of two motions each is traced from the runs that excite it. A motion whose constants the aircraft lacks is left out where
-    another one is answered.
+    Of two motions each is traced from the runs that excite it. A motion whose constants the aircraft lacks, or on which no
+    candidate acts, is left out where another one is answered.
 
     Parameters
     ----------
@@ -91,16 +93,44 @@ def parts_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> tuple[Mot
     names = {m.name: _runs(logs, m) for m in kept}
     if len(kept) > 1:
         kept = [m for m in kept if names[m.name]] or kept[:1]
+    asked = {m.name: _effects_of(m, options.effects) for m in kept}
+    for motion in kept if any(asked.values()) else ():
+        if asked[motion.name] == ():
+            notes.append(
+                f"the records excite the {motion.name} motion as well, which is not traced: no effect asked for acts on it"
+            )
+    kept = [m for m in kept if asked[m.name] != ()] or kept
     return tuple(
         MotionTrace(
             motion,
-            replace(options, motion=motion.name, hold_out=_held(options.hold_out, names, names[motion.name])),
+            replace(
+                options,
+                motion=motion.name,
+                hold_out=_held(options.hold_out, names, names[motion.name]),
+                effects=asked[motion.name] or options.effects,
+            ),
             motion.name if number else "",
             names[motion.name] or None,
             tuple(notes),
         )
         for number, motion in enumerate(kept)
     )
+
+
+def _effects_of(motion: Motion, effects: tuple[str | Effect, ...] | None) -> tuple[str | Effect, ...] | None:
+    """The candidates that act on a motion; None for the library, and each name that no motion has, which a trace refuses."""
+    if effects is None:
+        return None
+
+    def acts(effect: str | Effect) -> bool:
+        every = (
+            [effect]
+            if isinstance(effect, Effect)
+            else [e for e in EFFECTS.values() if effect in (e.key, e.name)]
+        )
+        return not every or any(motion.name in (e.motions or (motion.name,)) for e in every)
+
+    return tuple(effect for effect in effects if acts(effect))
 
 
 def _runs(logs: Logs, motion: Motion) -> tuple[str, ...]:

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from airtruth.identification.lateral.covariance import bread_of, meat, sandwich
-from airtruth.identification.lateral.observation import REGRESSORS, nonlinear, observe
+from airtruth.identification.lateral.observation import (
+    REGRESSORS,
+    change_of_attack,
+    nonlinear,
+    observe,
+    steady_flight,
+)
 from airtruth.identification.lateral.problems import smoothed
 from airtruth.identification.options import TERMS, Options
 from airtruth.logs.flight_log import Batch
@@ -40,11 +46,11 @@ def p_values(batch: Batch, constants: LateralConstants, options: Options) -> Arr
     """
     plain = replace(options, terms=())
     o = observe(batch, constants, plain)
-    alpha = batch.channels.get("alpha_rad", np.zeros_like(batch.t_s))
+    change = change_of_attack(batch, steady_flight(batch, plain).attack)
     runs, first = len(batch.run_ids), len(REGRESSORS)
     result = np.full((runs, len(TERMS), len(LATERAL.coefficients)), np.nan)
     for number, name in enumerate(TERMS):
-        terms = nonlinear(o.regressors, alpha, (name,))
+        terms = nonlinear(o.regressors, change, (name,))
         regressors = np.concatenate(
             [terms, o.regressors], axis=1
         )  # the surfaces stay last: they have corners

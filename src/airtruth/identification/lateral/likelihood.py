@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.estimates import JOINT, AnyScale, Estimates, concatenated, mean_scale
-from airtruth.identification.lateral.model_error import random_terms, with_random_terms, with_repeated_noise
+from airtruth.identification.lateral.model_error import (
+    random_terms,
+    with_random_terms,
+    with_repeated_noise,
+    with_uncertain_attack,
+)
+from airtruth.identification.lateral.observation import steady_flight
 from airtruth.identification.lateral.predictor import PROCESS, factor_names, levels, outputs_of, records_of
 from airtruth.identification.lateral.solve import regress_batch, regress_joint
 from airtruth.identification.likelihood.fit import (
@@ -104,12 +110,15 @@ def estimate(
         maxima = maximum_of_each(data, _with_factors(start.theta, options), search)
         memory = memory_of(data, maxima.z)
         known = np.flatnonzero(np.isfinite(maxima.z).all(axis=1))
-        if gusts and known.size and not set(TERMS) <= set(options.terms):
+        if gusts and known.size:
             more = records_of(part, values, replace(options, terms=TERMS), GUST_LENGTH_M, gusts=gusts)
             random = random_terms(options, search.weight.size)
             z = random.point(maxima.z[known])
             score = scored(more, z, known, np.arange(z.shape[1]))
-            moved = with_random_terms(maxima.of(known), score, search.weight, random)
+            moved = with_uncertain_attack(
+                with_random_terms(maxima.of(known), score, search.weight, random),
+                steady_flight(part, options).variance[known],
+            )
             maxima.z[known], maxima.covariance[known] = moved.z, moved.covariance
         made = _estimates(maxima, part.run_ids, data.scale, options, gusts=gusts)
         parts.append(replace(made, memory=memory))
@@ -127,16 +136,23 @@ def estimate_joint(
     """One estimate for all runs; they share the levels too. See `estimate`."""
     start = regress_joint(parts, values, "ls", None, replace(options, covariance="none"))
     noise = np.concatenate([_noise(part, own) for part, own in zip(parts, constants, strict=True)])
-    data = [
-        records_of(part, own, options, GUST_LENGTH_M, gusts=gusts)
-        for batch, own in zip(parts, values, strict=True)
-        for part in chunks(batch)
-    ]
+    steady = [steady_flight(part, options) for part in parts]
+    attack, variance = (np.concatenate(column) for column in zip(*steady, strict=True))
+
+    def read(chosen: Options) -> list[Records[LateralScale]]:
+        return [
+            records_of(part, own, chosen, GUST_LENGTH_M, gusts=gusts, attack=float(attack.mean()))
+            for batch, own in zip(parts, values, strict=True)
+            for part in chunks(batch)
+        ]
+
+    data = read(options)
     search = search_of(np.median(noise, axis=0, keepdims=True), options, gusts=gusts)
     maxima = joint_maximum(data, _with_factors(start.theta, options)[0], search)
     each = [memory_of(d, np.repeat(maxima.z, d.signals.y.shape[0], axis=0)) for d in data]
     if gusts and np.isfinite(maxima.z).all():
-        maxima = _with_model_error(maxima, data, parts, values, options, search)
+        more = read(replace(options, terms=TERMS))
+        maxima = _with_model_error(maxima, data, more, variance.mean() / variance.size, options, search)
     made = _estimates(maxima, (JOINT,), mean_scale([d.scale for d in data]), options, gusts=gusts)
     return replace(made, memory=np.concatenate(each).mean(keepdims=True))
 
@@ -144,31 +160,32 @@ def estimate_joint(
 def _with_model_error(
     maxima: Maxima,
     data: Sequence[Records[LateralScale]],
-    parts: Sequence[Batch],
-    values: Sequence[LateralValues],
+    more: Sequence[Records[LateralScale]],
+    variance: float,
     options: Options,
     search: Search,
 ) -> Maxima:
-    """The maximum of all runs with random terms and with noise of the moments that repeats (`lateral.model_error`)."""
+    """The maximum of all runs with random terms and with noise of the moments that repeats (`lateral.model_error`).
+
+    Parameters
+    ----------
+    data, more : records of the fit, and those in which every nonlinear term is free.
+    variance : of the angle of attack at which the derivatives hold [rad2].
+    """
     z = maxima.z
     _, _, each = scored_each(data, z, search.free)
     silent = z.copy()
     silent[:, -len(PROCESS) :] = -np.inf
     others = search.free[: -len(PROCESS)]
     quiet = scored_each(data, silent, others)[2].sum(axis=0) + np.diag(search.weight[: others.size])
-    moved = maxima
-    if not set(TERMS) <= set(options.terms):
-        every = replace(options, terms=TERMS)
-        more = [
-            records_of(part, own, every, GUST_LENGTH_M, gusts=True)
-            for batch, own in zip(parts, values, strict=True)
-            for part in chunks(batch)
-        ]
-        random = random_terms(options, search.weight.size)
-        at = random.point(z)
-        score = [part.sum(axis=0)[None] for part in scored_each(more, at, np.arange(at.shape[1]))]
-        moved = with_random_terms(maxima, (score[0], score[1], score[2]), search.weight, random)
-    return with_repeated_noise(moved, maxima.covariance[0], each, quiet)
+    random = random_terms(options, search.weight.size)
+    at = random.point(z)
+    cost, gradient, information = (
+        part.sum(axis=0)[None] for part in scored_each(more, at, np.arange(at.shape[1]))
+    )
+    moved = with_random_terms(maxima, (cost, gradient, information), search.weight, random)
+    repeated = with_repeated_noise(moved.maxima, maxima.covariance[0], each, quiet)
+    return with_uncertain_attack(moved._replace(maxima=repeated), np.array([variance]))
 
 
 def _estimates(

@@ -97,5 +97,7 @@ ESTIMATORS: Final[Mapping[str, Estimator]] = {
     "output-error": _likelihood("Output error", "Maine and Iliff, NASA RP-1138", gusts=False),
 }
 """Estimators by name, in the order of tables."""
+LINEAR: Final = tuple(name for name in ESTIMATORS if name != "filter-error")
+"""Estimators whose intervals do not allow for nonlinear terms that are not free."""
 
-__all__ = ["ESTIMATORS", "Estimator", "curvature_of", "lateral_values"]
+__all__ = ["ESTIMATORS", "LINEAR", "Estimator", "curvature_of", "lateral_values"]

@@ -1,20 +1,23 @@
 """Model error in the estimates of the lateral filter error: nonlinear terms of unknown size, noise of the moments that repeats.
 
-Terms that are not free are random: their factors f are normal about zero with a covariance of g times that of their estimates,
-and g is estimated from all of them. With k factors and the statistic W of Rao's test of f = 0, the derivatives move by the share
-s = 1 - k/W, at least 0, of what free terms would move them, and their covariance grows by that share. A linear aircraft has W
-of about k, so that little changes; a curved one has s near 1.
+Terms that are not free are random: the factor of a derivative is normal about zero, and its deviation is g times the size of the
+derivative. Each kind of term has one g, whose logarithm is uniform over `LOG_SPREADS`; the derivatives and their covariance are
+those of the posterior. The size of a moment's derivative is the norm over both moments, and over both rates: a change of alpha
+turns the axes, which mixes them.
+
+The derivatives hold at the angle of attack of the steady flight, which turbulence hides: its variance, times the square of the
+change of the derivatives with alpha, is part of their covariance.
 
 The noise of p' and r' is what the linear moments do not explain. It repeats with a manoeuvre, so that a joint estimate does not
 average it: the part of a variance that this noise causes is that of one record.
 
-Sources: C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50-57; B. Efron and C. Morris, J. Am. Stat. Assoc. 68 (1973) 117-130, eq.
-(1.11) for the share, the positive part of Stein's rule.
+Source: D. V. Lindley and A. F. M. Smith, J. R. Statist. Soc. B 34 (1972) 1-41, the lemma, for random factors of a linear model.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -31,6 +34,24 @@ Ints = NDArray[np.int64]
 
 _OWN: Final = slice(len(LATERAL.parameters))
 """Derivatives among the parameters."""
+_BY_ATTACK: Final = [
+    (*LATERAL.parameters, *factor_names(TERMS)).index(f"{name}_{TERMS[0]}") for name in LATERAL.parameters
+]
+"""Position of the change of each derivative with alpha, where every nonlinear term is free."""
+_MOMENTS: Final = slice(1, None)
+"""Rows of the derivatives that are those of moments."""
+_RATES: Final = [signal.length is not None for signal in LATERAL.signals]
+"""Signals that are rates."""
+LOG_SPREADS: Final = np.arange(-5.0, 3.5)
+"""Logarithms of the change of a derivative per radian, over its size [-]; judgement: below the least, a change of the angle by
+.1 rad moves it by less than .1 %; above the most, the linear model means nothing."""
+
+
+class WithTerms(NamedTuple):
+    """Maxima with random terms, and the change (groups, derivatives) of the derivatives with alpha [1/rad]."""
+
+    maxima: Maxima
+    by_attack: Array
 
 
 class RandomTerms(NamedTuple):
@@ -39,10 +60,13 @@ class RandomTerms(NamedTuple):
     Attributes
     ----------
     places : positions of the parameters of the fit; factors : positions of the factors that are random.
+    derivatives : numbers of the derivatives that these factors change; of_attack : whether with alpha, else with sideslip.
     """
 
     places: Ints
     factors: Ints
+    derivatives: Ints
+    of_attack: NDArray[np.bool_]
 
     def point(self, z: Array) -> Array:
         """Parameters (groups, all) of a fit (groups, its own), the random factors at zero."""
@@ -56,11 +80,16 @@ def random_terms(options: Options, parameters: int) -> RandomTerms:
     every = (*LATERAL.parameters, *factor_names(TERMS))
     own = [every.index(name) for name in (*LATERAL.parameters, *factor_names(options.terms))]
     places = np.array([*own, *(len(every) + i for i in range(parameters - len(own)))])
-    return RandomTerms(places, np.setdiff1d(np.arange(len(every)), own))
+    factors = np.setdiff1d(np.arange(len(every)), own)
+    of = [every[i].rpartition("_")[::2] for i in factors]
+    derivatives = np.array([LATERAL.index(name) for name, _ in of], dtype=np.int64)
+    return RandomTerms(
+        places, factors, derivatives, np.array([term == TERMS[0] for _, term in of], dtype=np.bool_)
+    )
 
 
-def with_random_terms(maxima: Maxima, score: Scored, weight: Array, random: RandomTerms) -> Maxima:
-    """Maxima whose derivatives and their covariances hold random terms, by one step of scoring.
+def with_random_terms(maxima: Maxima, score: Scored, weight: Array, random: RandomTerms) -> WithTerms:
+    """Maxima whose derivatives and their covariances hold random terms, from one step of scoring.
 
     Parameters
     ----------
@@ -70,18 +99,44 @@ def with_random_terms(maxima: Maxima, score: Scored, weight: Array, random: Rand
     random : the terms.
     """
     _, gradient, likelihood = score
-    prior = random.point(weight[None])[0]
-    information = likelihood + np.diag(prior)
-    slope = gradient[:, random.factors, None]
-    known = np.einsum("gii->gi", information)[:, random.factors] > 0.0
-    full = normal_equations.scaled_inverse(information, RIDGE)
-    to_factors = full[:, :, random.factors]
-    statistic = np.sum(slope * np.matmul(to_factors[:, random.factors], slope), axis=(1, 2))
-    share = np.maximum(1.0 - known.sum(axis=1) / np.maximum(statistic, np.finfo(float).tiny), 0.0)
-    z, covariance = maxima.z.copy(), maxima.covariance.copy()
-    z[:, _OWN] -= share[:, None] * np.matmul(to_factors[:, _OWN], slope)[..., 0]
-    covariance[:, _OWN, _OWN] += share[:, None, None] * (full[:, _OWN, _OWN] - covariance[:, _OWN, _OWN])
-    return replace(maxima, z=z, covariance=covariance)
+    full = normal_equations.scaled_inverse(likelihood + np.diag(random.point(weight[None])[0]), RIDGE)
+    z, covariance, every = maxima.z.copy(), maxima.covariance.copy(), random.point(maxima.z)
+    for group, inverse in enumerate(full):
+        by_factors = inverse[:, random.factors]
+        free = -by_factors @ gradient[group, random.factors]
+        size = _sizes(maxima.z[group, _OWN])[random.derivatives]
+        spread = np.stack(
+            [size * np.where(random.of_attack, *pair) for pair in product(np.exp(LOG_SPREADS), repeat=2)]
+        )
+        inner = by_factors[random.factors] + spread[:, None] ** 2 * np.eye(size.size)
+        precision = np.linalg.inv(inner)
+        pull = precision @ free[random.factors]
+        logarithm = -0.5 * (np.linalg.slogdet(inner)[1] + pull @ free[random.factors])
+        share = np.exp(logarithm - logarithm.max())
+        share /= share.sum()
+        mean = share @ pull
+        less = np.tensordot(share, precision, 1) - np.einsum("k,ki,kj->ij", share, pull - mean, pull - mean)
+        every[group] += free - by_factors @ mean
+        derivatives = by_factors[_OWN]
+        covariance[group, _OWN, _OWN] = inverse[_OWN, _OWN] - derivatives @ less @ derivatives.T
+    z[:, _OWN] = every[:, _OWN]
+    return WithTerms(replace(maxima, z=z, covariance=covariance), every[:, _BY_ATTACK])
+
+
+def _sizes(theta: Array) -> Array:
+    """(15,) sizes of the derivatives (15,) that scale their random factors."""
+    size = np.square(theta.reshape(LATERAL.shape))
+    size[_MOMENTS] = size[_MOMENTS].sum(axis=0)
+    size[:, _RATES] = size[:, _RATES].sum(axis=1, keepdims=True)
+    return np.sqrt(size).reshape(-1)
+
+
+def with_uncertain_attack(made: WithTerms, variance: Array) -> Maxima:
+    """Maxima whose derivatives hold at an angle of attack of that variance (groups,) [rad2]."""
+    covariance = made.maxima.covariance.copy()
+    moved = made.by_attack * np.sqrt(variance)[:, None]
+    covariance[:, _OWN, _OWN] += moved[:, :, None] * moved[:, None, :]
+    return replace(made.maxima, covariance=covariance)
 
 
 def with_repeated_noise(maxima: Maxima, total: Array, each: Array, quiet: Array) -> Maxima:
@@ -106,4 +161,11 @@ def with_repeated_noise(maxima: Maxima, total: Array, each: Array, quiet: Array)
     return replace(maxima, covariance=covariance)
 
 
-__all__ = ["RandomTerms", "random_terms", "with_random_terms", "with_repeated_noise"]
+__all__ = [
+    "RandomTerms",
+    "WithTerms",
+    "random_terms",
+    "with_random_terms",
+    "with_repeated_noise",
+    "with_uncertain_attack",
+]

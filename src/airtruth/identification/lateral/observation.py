@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,18 +116,51 @@ def nonlinear(regressors: Array, alpha: Array, names: Collection[str]) -> Array:
     Parameters
     ----------
     regressors : (runs, signals, samples), about the trim.
-    alpha : (runs, samples) angle of attack [rad].
-    names : "alpha": the product of each signal with alpha about its mean, so that the derivatives are those at the mean;
-        "beta": beta |beta|.
+    alpha : (runs, samples) angle of attack about the one at which the derivatives hold [rad].
+    names : "alpha": the product of each signal with alpha; "beta": beta |beta|.
     """
     runs, _, samples = regressors.shape
     made = [np.empty((runs, 0, samples))]
     if "alpha" in names:
-        made.append(regressors * (alpha - alpha.mean(axis=1, keepdims=True))[:, None])
+        made.append(regressors * alpha[:, None])
     if "beta" in names:
         beta = regressors[:, [_BETA]]
         made.append(beta * np.abs(beta))
     return np.concatenate(made, axis=1)
+
+
+class SteadyFlight(NamedTuple):
+    """Flight before the manoeuvre.
+
+    Attributes
+    ----------
+    attack : (runs,) measured angle of attack [rad].
+    variance : (runs,) of it, because turbulence moves it [rad2].
+    """
+
+    attack: Array
+    variance: Array
+
+
+def steady_flight(batch: Batch, options: Options) -> SteadyFlight:
+    """Mean over the first ``options.trim_window_s``, and the variance of means over pieces of that length.
+
+    Both are zero where the log lacks the angle of attack.
+    """
+    attack = _attack(batch)
+    samples = attack.shape[1]
+    length = samples // max(2, samples // window_samples(options, batch.dt_s))
+    means = attack[:, : samples // length * length].reshape(len(attack), -1, length).mean(axis=2)
+    return SteadyFlight(means[:, 0], means.var(axis=1, ddof=1))
+
+
+def change_of_attack(batch: Batch, steady: Array) -> Array:
+    """(runs, samples) measured angle of attack about a steady one (runs,) [rad]; about zero where the log lacks it."""
+    return np.asarray(_attack(batch) - steady[:, None])
+
+
+def _attack(batch: Batch) -> Array:
+    return np.asarray(batch.channels.get("alpha_rad", np.zeros_like(batch.t_s)))
 
 
 def known_inputs(batch: Batch) -> Known:
@@ -262,7 +295,9 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Late
         added=added,
         bend=np.stack(np.split(servo_bend(surfaces), len(CONTROLS)), axis=1),
         trend=known.trend,
-        terms=nonlinear(regressors, known.alpha, options.terms),
+        terms=nonlinear(
+            regressors, change_of_attack(batch, steady_flight(batch, options).attack), options.terms
+        ),
         scale=scale,
     )
 
@@ -272,11 +307,14 @@ __all__ = [
     "Each",
     "Known",
     "LateralObservation",
+    "SteadyFlight",
     "assumed",
+    "change_of_attack",
     "condition_of",
     "integrated",
     "known_inputs",
     "nonlinear",
     "nonlinear_columns",
     "observe",
+    "steady_flight",
 ]

@@ -22,10 +22,12 @@ from airtruth.identification.lateral.observation import (
     CONTROLS,
     REGRESSORS,
     Known,
+    change_of_attack,
     condition_of,
     known_inputs,
     nonlinear,
     nonlinear_columns,
+    steady_flight,
 )
 from airtruth.identification.likelihood.fit import Records
 from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
@@ -203,20 +205,35 @@ def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Opt
     return np.stack(made, axis=2)
 
 
-def term_inputs(batch: Batch, known: Known, options: Options) -> Array:
-    """Nonlinear terms of the signals about their first samples, (runs, samples, terms), by ``options.terms``."""
+def term_inputs(batch: Batch, known: Known, options: Options, attack: Array) -> Array:
+    """Nonlinear terms (runs, samples, terms) of the signals about their first samples, at an angle of attack (runs,) [rad]."""
     signals = _signals(batch, known)
-    return np.swapaxes(nonlinear(signals - signals[..., :1], known.alpha, options.terms), 1, 2)
+    terms = nonlinear(signals - signals[..., :1], change_of_attack(batch, attack), options.terms)
+    return np.swapaxes(terms, 1, 2)
 
 
 def records_of(
-    batch: Batch, constants: LateralConstants, options: Options, length_m: float, *, gusts: bool
+    batch: Batch,
+    constants: LateralConstants,
+    options: Options,
+    length_m: float,
+    *,
+    gusts: bool,
+    attack: float | None = None,
 ) -> Records[LateralScale]:
     """Signals and predictor of a batch; nothing is checked. Outputs are the channels that the log has.
 
     Surfaces between samples have the area of the cubic through the four nearest samples, and the corners of a first-order
     servo behind a held command where the record shows one (`airtruth.numerics.intersample`).
+
+    Parameters
+    ----------
+    length_m : scale length of the gust [m]; gusts : as in `predictor_of`.
+    attack : angle of attack at which the derivatives hold [rad], where terms make them depend on it; None for the steady one of
+        each run.
     """
+    at = steady_flight(batch, options).attack
+    at = at if attack is None else np.full_like(at, attack)
     known = known_inputs(batch)
     scale = condition_of(batch, constants, options, known)
     outputs = outputs_of(batch)
@@ -227,7 +244,7 @@ def records_of(
     measured = options.pressure != "constant" and options.airspeed_m_s is None
     if measured:
         u.append(surplus_inputs(batch, scale, known, options))
-    u.append(term_inputs(batch, known, options))
+    u.append(term_inputs(batch, known, options, at))
     inputs = np.concatenate(u, axis=2)
     edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
     bend = np.zeros_like(inputs)
