@@ -119,15 +119,6 @@ def own_likelihood(
     return _negative_log_likelihood(respond(problem.records[index], problem.settings, compiled, common, own))
 
 
-def likelihood_at(problem: TraceProblem, hypothesis: Hypothesis, point: Parameters) -> float:
-    """Negative log-likelihood of all records at a point; infinite where a motion leaves all bounds."""
-    compiled = hypothesis.compiled(point.sizes)
-    return sum(
-        _negative_log_likelihood(respond(record, problem.settings, compiled, point.common, own))
-        for record, own in zip(problem.records, point.per_record, strict=True)
-    )
-
-
 def _negative_log_likelihood(response: Response) -> float:
     """Infinite where the motion leaves all bounds."""
     if not np.isfinite(response.logdet):
@@ -368,7 +359,6 @@ __all__ = [
     "assess",
     "fitted_noise_floor",
     "free_run",
-    "likelihood_at",
     "noise_floor",
     "own_likelihood",
 ]
