@@ -101,11 +101,11 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
     "simulation/campaign/workers": ("tests/simulation/test_campaign_workers.py", SLOW_TOO),
     "tracing/selection/evidence": (
         "tests/tracing/test_evidence.py",
+        "tests/tracing/test_explanation.py",
         "-knot about_a_fit and not predicted_point",
     ),
+    "tracing/anomalies/significance": ("tests/tracing/test_significance.py",),
     "tracing/selection/explanation": ("tests/tracing/test_explanation.py",),
-    "tracing/selection/significance": ("tests/tracing/test_significance.py",),
-    "tracing/selection/weights": ("tests/tracing/test_set_weights.py",),
 }
 """Module below src/airtruth -> tests that have to notice a change of it."""
 

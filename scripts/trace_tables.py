@@ -44,9 +44,11 @@ CLASSES: Final = {
 
 DECIDING: Final = (
     "tracing/answer.py",
+    "tracing/anomalies/*.py",
     "tracing/calibration/*.py",
     "tracing/confirmation.py",
     "tracing/friction.py",
+    "tracing/learning/*.py",
     "tracing/record_differences.py",
     "tracing/reservations.py",
     "tracing/selection/*.py",

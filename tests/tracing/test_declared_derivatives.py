@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from airtruth.physics.motion import LONGITUDINAL
+from airtruth.tracing.anomalies.families import advice
 from airtruth.tracing.declared_model import remaining_evidence
 from airtruth.tracing.inference import derivative_likelihood as module
 from airtruth.tracing.inference.derivative_likelihood import (
@@ -17,7 +18,6 @@ from airtruth.tracing.inference.derivative_likelihood import (
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.model.declared import declared_covariance
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
-from airtruth.tracing.selection.families import advice
 
 DECLARED = np.diag([0.24, 9.5, 0.05, 0.09, 6.2, 0.09]) ** 2
 """Covariance of the declared derivatives of aircraft/gtm, independent."""

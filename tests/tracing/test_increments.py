@@ -19,6 +19,7 @@ from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, shape_of, term
 from airtruth.table import significant
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
+from airtruth.tracing.anomalies.flown import flown
 from airtruth.tracing.effect_module import MODULE, effect_module
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
@@ -29,15 +30,14 @@ from airtruth.tracing.inference.posterior import (
     sensitivities_of,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.presentation.text import increment_words
-from airtruth.tracing.selection.flown import flown
-from airtruth.tracing.selection.increment_fit import (
+from airtruth.tracing.learning.increment_fit import (
     effective_bends,
     is_apart_from_zero,
 )
-from airtruth.tracing.selection.increments import log_evidences, screen, shapes, sharpened
+from airtruth.tracing.learning.increments import log_evidences, screen, shapes, sharpened
+from airtruth.tracing.model.compile import compile_change
+from airtruth.tracing.model.parameters import SHORT_PERIOD
+from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.update import from_zero_alpha
 from airtruth.units import DEG
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from airtruth.tracing.selection.significance import FAMILY_LEVEL, significant_gain
+from airtruth.tracing.anomalies.significance import FAMILY_LEVEL, significant_gain
 
 
 def test_the_gain_of_33_candidates_is_round():

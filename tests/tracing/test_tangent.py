@@ -13,11 +13,11 @@ from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing.inference.direction import Direction, extended_by
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.learning.increment_inputs import FlownMotion, sensitivities_to
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.model.response import External, filter_inputs, respond_to
 from airtruth.tracing.model.tangent import FLOWN, POINTS, propagated, tangent_of
-from airtruth.tracing.selection.increment_inputs import FlownMotion, sensitivities_to
 
 LATE = Change(sensors=(SensorTerm("q_rad_s", "lag", 0.03), SensorTerm("az_m_s2", "delay", 0.015)))
 """Sensors with a lag and a delay."""
@@ -146,7 +146,7 @@ def test_many_shapes_pass_in_blocks(null, monkeypatch):
     problem, fitted = null
     every = [shape for shape, _ in SHAPES.values()]
     whole = sensitivities_to(fitted, problem, every)
-    monkeypatch.setattr("airtruth.tracing.selection.increment_inputs._BLOCK", 1)
+    monkeypatch.setattr("airtruth.tracing.learning.increment_inputs._BLOCK", 1)
     assert len(whole)
     for one, own in zip(whole, sensitivities_to(fitted, problem, every), strict=True):
         np.testing.assert_allclose(own.t, one.t, rtol=1e-9, atol=1e-9 * np.abs(one.t).max())

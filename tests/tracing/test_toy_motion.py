@@ -16,6 +16,7 @@ from airtruth.physics import motion
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
+from airtruth.tracing.anomalies.score_test import table
 from airtruth.tracing.answer import Derivatives, Evidence, RecordNames, TraceAnswer
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
@@ -39,7 +40,6 @@ from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.steady import steady_filter
 from airtruth.tracing.presentation.html import as_trace_html
 from airtruth.tracing.presentation.text import as_trace_text
-from airtruth.tracing.selection.score_test import table
 from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
 TRUTH = np.array([-0.12, -2.0, 0.05, -0.03, 0.004])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trace_records as tr
 
+from airtruth.tracing.anomalies.omnibus import views
 from airtruth.tracing.friction import PLAUSIBLE_RAD, imitated_lag_s
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.selection.omnibus import views
 from airtruth.units import DEG
 
 

@@ -11,16 +11,16 @@ from scipy.stats import chi2
 
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.anomalies.families import advice, families
+from airtruth.tracing.anomalies.omnibus import anomalies, chi_square, views
+from airtruth.tracing.anomalies.spectrum import lines
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.records import nodes
 from airtruth.tracing.model.response import External, respond
 from airtruth.tracing.model.surface import play
-from airtruth.tracing.selection.families import advice, families
-from airtruth.tracing.selection.omnibus import anomalies, chi_square, views
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.spectrum import lines
 from airtruth.units import DEG
 
 pytestmark = pytest.mark.slow

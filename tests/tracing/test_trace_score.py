@@ -9,11 +9,11 @@ from scipy.stats import norm
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.anomalies.score_test import directions, holm, table
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.whitening import NO_WHITENER, autoregression
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import respond
-from airtruth.tracing.selection.score_test import directions, holm, table
 from airtruth.units import DEG
 
 pytestmark = pytest.mark.slow

@@ -31,10 +31,10 @@ from airtruth.tracing.accepted import IncrementTable
 from airtruth.tracing.answer import Z95, AcceptedEffect
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem, sensitivities_of
+from airtruth.tracing.learning.increments import CELLS
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.selection.increments import CELLS
 
 Array = NDArray[np.float64]
 

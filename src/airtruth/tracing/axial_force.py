@@ -36,11 +36,11 @@ from airtruth.tracing.increment_table import table_of
 from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
+from airtruth.tracing.learning.increment_fit import LEAST_ODDS, effective_bends, is_apart_from_zero
+from airtruth.tracing.learning.increments import CELLS, best_prior, covered
+from airtruth.tracing.learning.learn import LEAST_RECORDS
 from airtruth.tracing.model.plant import FLOW
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.increment_fit import LEAST_ODDS, effective_bends, is_apart_from_zero
-from airtruth.tracing.selection.increments import CELLS, best_prior, covered
-from airtruth.tracing.selection.learn import LEAST_RECORDS
 from airtruth.tracing.stage_errors import AxialErrors, AxialRms
 from airtruth.tracing.stages import Stages
 

@@ -12,6 +12,9 @@ from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
 from airtruth.physics.atmosphere import RHO0_KG_M3
+from airtruth.tracing.anomalies.families import FRICTION
+from airtruth.tracing.anomalies.score_test import ScoreTable
+from airtruth.tracing.anomalies.significance import CONTRADICTED, LEVEL
 from airtruth.tracing.answer import (
     ANOMALY_LEVEL,
     AcceptedEffect,
@@ -58,10 +61,7 @@ from airtruth.tracing.record_differences import CERTAIN, differences
 from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.candidate import Candidate
-from airtruth.tracing.selection.families import FRICTION
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.score_test import ScoreTable
-from airtruth.tracing.selection.significance import CONTRADICTED, LEVEL
 from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import Stages, accepted, stage_errors
 from airtruth.tracing.tolerances import tolerances

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2, norm
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.anomalies.significance import CONTRADICTED
 from airtruth.tracing.answer import (
     DECLARED_LEVEL,
     Z95,
@@ -40,7 +41,6 @@ from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.selection.explanation import AS_GOOD, ExplainedDerivatives
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.significance import CONTRADICTED
 
 Array = NDArray[np.float64]
 

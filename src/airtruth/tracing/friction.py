@@ -8,8 +8,8 @@ import numpy as np
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import VANES
+from airtruth.tracing.anomalies.omnibus import views
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.selection.omnibus import views
 from airtruth.units import DEG
 
 PLAUSIBLE_RAD: Final = 0.1 * DEG

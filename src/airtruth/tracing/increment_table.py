@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from airtruth.effects.increment import Increment, Shape
 from airtruth.effects.increment_shape import names_over
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
+from airtruth.tracing.anomalies.flown import flown
 from airtruth.tracing.answer import Z95, CandidateScore
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.selection.flown import flown
-from airtruth.tracing.selection.increment_fit import fitted_bends, relative_swing
+from airtruth.tracing.learning.increment_fit import fitted_bends, relative_swing
 from airtruth.tracing.selection.rounds import SearchRound
 
 Array = NDArray[np.float64]

@@ -22,10 +22,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.anomalies.significance import significant_gain
 from airtruth.tracing.answer import DECLARED_LEVEL
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.searched import Searched
-from airtruth.tracing.selection.significance import significant_gain
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.tracing.anomalies.families import advice
 from airtruth.tracing.answer import ANOMALY_LEVEL, VerdictName
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.selection.candidate import Candidate
-from airtruth.tracing.selection.families import advice
 
 
 def next_flight(

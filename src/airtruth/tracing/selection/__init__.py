@@ -1,1 +1,1 @@
-"""Score tests, omnibus tests, acceptance rules and the search over effects."""
+"""The search: the evidence of every set of effects, and the set that an answer states."""

@@ -9,21 +9,23 @@ leads is expanded in turn. The search ends when no set without a refit is predic
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.anomalies.omnibus import anomalies
 from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import inflation
+from airtruth.tracing.inference.whitening import autoregression
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.evidence import Quadratic, Weighed
 from airtruth.tracing.selection.expansion import Expansion, expanded
-from airtruth.tracing.selection.explanation import ExplainedDerivatives, shares, simplest
+from airtruth.tracing.selection.explanation import simplest
+from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior, normalised
 from airtruth.tracing.selection.set_table import SetTable
 
 ODDS: Final = 3.0
@@ -35,91 +37,10 @@ MOST_EFFECTS: Final = 3
 _HELD: Final = 1e-4
 """Variance of derivatives that are held as they are declared, over the declared one [-] (judgement: a hundredth of a standard
 deviation)."""
+_MISFIT: Final = 1e-6
+"""Probability of the anomaly of the best set below which every effect is refitted alone [-] (judgement: beyond doubt)."""
 _SAME: Final = 0.05
 """Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
-Names = tuple[str, ...]
-"""Names of a set, sorted."""
-
-
-@dataclass(frozen=True)
-class EvaluatedSet:
-    """A set with its evidence.
-
-    Attributes
-    ----------
-    expansion : about the fit that tells; quadratic, weighed : the set in it.
-    """
-
-    expansion: Expansion
-    quadratic: Quadratic
-    weighed: Weighed
-
-    @property
-    def names(self) -> Names:
-        """Names of the set."""
-        return self.quadratic.names(self.weighed)
-
-    @property
-    def explains_derivatives(self) -> bool:
-        """Whether it holds wrong declarations, or causes that the filter does not carry."""
-        return bool(self.weighed.declaration.wrong) or any(
-            self.quadratic.columns[i].cause for i in self.weighed.columns
-        )
-
-    @property
-    def is_refitted(self) -> bool:
-        """Whether the fit has the effects of the set, and its own prior of the derivatives."""
-        fitted = self.expansion.last.hypothesis
-        own = {e.key for e in fitted.effects} == self.quadratic.in_filter(self.weighed)
-        return own and (fitted.spread is not None) == self.explains_derivatives
-
-    @property
-    def explanation(self) -> ExplainedDerivatives | None:
-        """The derivatives by this set; None where it leaves them as they are declared."""
-        if not self.explains_derivatives:
-            return None
-        q, w = self.quadratic, self.weighed
-        sizes, std = q.alone(w)
-        at = [k for k, i in enumerate(w.columns) if q.columns[i].cause is not None]
-        motion = self.expansion.last.hypothesis.motion
-        return ExplainedDerivatives(
-            tuple(q.columns[w.columns[k]].key for k in at),
-            tuple(motion.parameters[i] for i in w.declaration.wrong),
-            tuple(float(sizes[k]) for k in at),
-            tuple(float(std[k]) for k in at),
-        )
-
-
-@dataclass(frozen=True)
-class Posterior:
-    """Outcome of a search.
-
-    Attributes
-    ----------
-    weights : names of each set -> its posterior probability among all sets, the most probable first.
-    evaluated : names of each set -> its most probable member, refitted where one was.
-    fits : keys of the effects of the filter -> their most probable fit under the declaration.
-    null : fit without any effect.
-    refits : number of refits, that without any effect included.
-    temper : long-run variance of the slopes of the likelihood over that of white innovations [-].
-    """
-
-    weights: Mapping[Names, float]
-    evaluated: Mapping[Names, EvaluatedSet]
-    fits: Mapping[frozenset[str], PosteriorFit]
-    null: PosteriorFit
-    refits: int
-    temper: float
-
-    @property
-    def simplest(self) -> Names:
-        """The set of an answer, see `airtruth.tracing.selection.explanation.simplest`."""
-        return simplest(self.weights)
-
-    @property
-    def best(self) -> PosteriorFit:
-        """Fit of the most probable set."""
-        return self.evaluated[next(iter(self.weights))].expansion.last
 
 
 def best_first(
@@ -182,6 +103,7 @@ class _BestFirst:
         self._tempered(null)
         measured: list[PosteriorFit] = [null]
         seen: list[PosteriorFit] = []
+        swept, limit = False, REFITS
         while True:
             best = self._best()
             fitted = best.expansion.last
@@ -193,8 +115,13 @@ class _BestFirst:
                 seen.append(fitted)
                 self._predict(fitted)
             following = self._following(best)
-            if following is None or self.refits >= REFITS:
-                break
+            if following is None or self.refits >= limit:
+                if swept or not self._is_misfit(fitted):
+                    break
+                swept = True
+                self._sweep(null)
+                limit = self.refits + REFITS
+                continue
             if not may_begin(self.advance, f"refit {' + '.join(following.names)}"):
                 break
             self._refit(following)
@@ -203,7 +130,7 @@ class _BestFirst:
             key: min((e.last for e in every), key=lambda f: (f.hypothesis.spread is not None, f.cost))
             for key, every in self._fits.items()
         }
-        return Posterior(_normalised(logs), evaluated, fits, null, self.refits, self.temper)
+        return Posterior(normalised(logs), evaluated, fits, null, self.refits, self.temper)
 
     def _begin_at(self, null: PosteriorFit, known: Mapping[str, float]) -> None:
         """Refit a set from the declared aircraft at known values."""
@@ -218,6 +145,26 @@ class _BestFirst:
             self._fits.setdefault(frozenset(e.key for e in effects), []).append(
                 expanded(self.sets.problem, own)
             )
+
+    def _is_misfit(self, fitted: PosteriorFit) -> bool:
+        """Whether a fit leaves an anomaly beyond doubt."""
+        tests = anomalies(fitted, self.sets.problem, autoregression(fitted.innovations))
+        return len(tests) * min(test.p_value for test in tests) < _MISFIT
+
+    def _sweep(self, null: PosteriorFit) -> None:
+        """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it."""
+        for effect in self.effects:
+            key, first = frozenset((effect.key,)), effect.parameters[0]
+            if key in self._fits or len(effect.parameters) > 1:
+                continue
+            if not may_begin(self.advance, f"refit {effect.key}"):
+                return
+            hypothesis = replace(self.hypothesis, effects=(effect,))
+            size = np.array([(first.sign or 1.0) * first.material])
+            own = self.sets.fit_from_declared(hypothesis, size, null)
+            self.refits += 1
+            if own is not None and own.cost < null.cost:
+                self._fits[key] = [expanded(self.sets.problem, own)]
 
     def _as_declared(self, null: PosteriorFit) -> PosteriorFit | None:
         """The fit with the declared derivatives: those of the null may have absorbed an effect."""
@@ -299,7 +246,7 @@ class _BestFirst:
         if leading is not None:
             return leading
         logs, evaluated = self._evidence()
-        answer = evaluated[simplest(_normalised(logs))]
+        answer = evaluated[simplest(normalised(logs))]
         return next((p for p in (answer, *self._smaller(answer)) if self._wants(p)), None)
 
     def _smaller(self, answer: EvaluatedSet) -> Iterator[EvaluatedSet]:
@@ -387,11 +334,4 @@ class _BestFirst:
         return logs, evaluated
 
 
-def _normalised(logs: Mapping[Names, float]) -> dict[Names, float]:
-    """Posterior probabilities, the largest first."""
-    top = max(logs.values())
-    order = sorted(logs, key=lambda names: (-logs[names], names))
-    return shares({names: float(np.exp(logs[names] - top)) for names in order})
-
-
-__all__ = ["ODDS", "EvaluatedSet", "Posterior", "best_first"]
+__all__ = ["ODDS", "best_first"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from airtruth.tracing.anomalies.score_test import Score
 from airtruth.tracing.inference.posterior import PosteriorFit
-from airtruth.tracing.selection.score_test import Score
 
 
 @dataclass(frozen=True)

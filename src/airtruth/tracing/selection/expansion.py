@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.numerics.normal_equations import scaled_step
+from airtruth.tracing.anomalies.score_test import LOCATIONS, directions, perceptible_step
 from airtruth.tracing.inference.causes import Cause
 from airtruth.tracing.inference.direction import eliminated, extended_by
 from airtruth.tracing.inference.hypothesis import unconstrained_by
@@ -26,7 +27,6 @@ from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.columns import EffectColumn
 from airtruth.tracing.selection.evidence import Quadratic
-from airtruth.tracing.selection.score_test import LOCATIONS, directions, perceptible_step
 
 Array = NDArray[np.float64]
 

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.anomalies import score_test
+from airtruth.tracing.anomalies.omnibus import anomalies
+from airtruth.tracing.anomalies.score_test import ScoreTable
+from airtruth.tracing.anomalies.significance import strongest
 from airtruth.tracing.inference.derivative_likelihood import Contradiction, contradiction
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import Profile
 from airtruth.tracing.inference.whitening import Whitener, autoregression
-from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.explanation import ExplainedDerivatives
-from airtruth.tracing.selection.omnibus import anomalies
-from airtruth.tracing.selection.score_test import ScoreTable
-from airtruth.tracing.selection.significance import strongest
 
 Array = NDArray[np.float64]
 

@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.anomalies.score_test import Score
 from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.profile import best_location, location_index, relocated
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.best_first import EvaluatedSet, Names, Posterior, best_first
+from airtruth.tracing.selection.best_first import best_first
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.explanation import shares, simplest
+from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior
 from airtruth.tracing.selection.predictive import has_converged, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.rounds import SearchRound, scored
-from airtruth.tracing.selection.score_test import Score
 from airtruth.tracing.selection.set_table import SetTable, in_order_of
 
 

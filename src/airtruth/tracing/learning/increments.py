@@ -23,12 +23,12 @@ from scipy.special import logsumexp
 from airtruth.effects.increment import STEPS, Increment, Memory, Shape, increment
 from airtruth.physics.motion import Motion
 from airtruth.physics.terms import QBAR, factors_of
+from airtruth.tracing.anomalies.flown import flown, known
 from airtruth.tracing.inference.direction import projected
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
+from airtruth.tracing.learning.increment_inputs import sensitivities_to
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.selection.flown import flown, known
-from airtruth.tracing.selection.increment_inputs import sensitivities_to
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from airtruth.tracing.anomalies.score_test import ScoreTable
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
-from airtruth.tracing.selection.score_test import ScoreTable
 
 LEVEL: Final = 0.05
 """Significance level of the scores in the first round, after Holm's correction [-] (convention)."""

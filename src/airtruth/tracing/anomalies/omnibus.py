@@ -1,11 +1,11 @@
 """Omnibus tests: whether the declared aircraft lacks anything, whichever effect it is.
 
 Families of directions, each a chi-square test with the nuisance parameters eliminated, and a test of the spectrum
-(`airtruth.tracing.selection.spectrum`). A direction is a series added to a coefficient or an output. Series of the motion are
+(`airtruth.tracing.anomalies.spectrum`). A direction is a series added to a coefficient or an output. Series of the motion are
 functions of predicted outputs: a prediction does not contain the noise of its own sample, so that under the null the scores
 are a martingale.
 
-Source: C. R. Rao's score test as in `airtruth.tracing.selection.score_test`.
+Source: C. R. Rao's score test as in `airtruth.tracing.anomalies.score_test`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from airtruth.physics.motion import Motion
+from airtruth.tracing.anomalies.families import Destinations, Series, View, families
+from airtruth.tracing.anomalies.spectrum import lines
 from airtruth.tracing.inference.direction import inserted, projected
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
@@ -25,8 +27,6 @@ from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.records import TraceRecord, nodes
 from airtruth.tracing.model.response import External, Response, filter_inputs, respond_to
 from airtruth.tracing.model.settings import without
-from airtruth.tracing.selection.families import Destinations, Series, View, families
-from airtruth.tracing.selection.spectrum import lines
 
 Array = NDArray[np.float64]
 

@@ -11,23 +11,23 @@ from scipy.special import expit
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import NAME, Increment, Shape
+from airtruth.tracing.anomalies.significance import CONTRADICTED, REMAINS
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.candidate import Candidate
-from airtruth.tracing.selection.explanation import shares
-from airtruth.tracing.selection.increment_fit import (
+from airtruth.tracing.learning.increment_fit import (
     assessed,
     converged,
     evidence_score,
     refitted,
 )
-from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
+from airtruth.tracing.learning.increments import Screened, screen, shapes, sharpened
+from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.candidate import Candidate
+from airtruth.tracing.selection.explanation import shares
 from airtruth.tracing.selection.predictive import reference_of
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import SearchRound, scored
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.significance import CONTRADICTED, REMAINS
 
 TIE: Final = 6.0
 """Difference in 2 log L up to which two increments explain the records equally well [-] (judgement: a likelihood ratio of 20)."""

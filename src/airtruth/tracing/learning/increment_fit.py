@@ -14,17 +14,17 @@ from airtruth.effects.increment import Increment
 from airtruth.physics.motion import Motion
 from airtruth.physics.readings import increments_over
 from airtruth.physics.terms import QBAR
+from airtruth.tracing.anomalies.flown import flown
+from airtruth.tracing.anomalies.score_test import Score
 from airtruth.tracing.inference.direction import Direction
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
+from airtruth.tracing.learning.increments import Screened
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.selection.candidate import Candidate
-from airtruth.tracing.selection.flown import flown
-from airtruth.tracing.selection.increments import Screened
 from airtruth.tracing.selection.predictive import Reference, has_converged, tested_on_left_out
 from airtruth.tracing.selection.refusal import Refusal
-from airtruth.tracing.selection.score_test import Score
 
 Array = NDArray[np.float64]
 

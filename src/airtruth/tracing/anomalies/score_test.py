@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.anomalies.flown import flown
 from airtruth.tracing.inference.direction import Direction, change_along, extended_by, with_freedoms
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener
 from airtruth.tracing.model.response import respond
-from airtruth.tracing.selection.flown import flown
 
 Array = NDArray[np.float64]
 

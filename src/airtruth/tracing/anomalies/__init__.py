@@ -1,0 +1,1 @@
+"""Tests whether a fit lacks anything: scores of effects, and omnibus tests that name none."""
