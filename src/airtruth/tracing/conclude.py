@@ -266,6 +266,8 @@ def _candidates(
     for s, p in zip(first.table.scores, first.adjusted, strict=True):
         if s.effect.key in named or s.effect.label in named:
             why = ""
+        elif any(s.effect.key in step.removeprefix("refit ").split(" + ") for step in case.left_out):
+            why = "the time budget ended before its refit"
         elif p > LEVEL:
             why = "its score is not significant"
         else:

@@ -39,7 +39,7 @@ from airtruth.tracing.inference.derivative_likelihood import (
 )
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.selection.explanation import AS_GOOD, ExplainedDerivatives
+from airtruth.tracing.selection.explanation import AS_GOOD, ExplainedDerivatives, shares
 from airtruth.tracing.selection.rounds import SearchRound
 
 Array = NDArray[np.float64]
@@ -347,9 +347,10 @@ def _normal(value: float, std: float) -> ParameterEstimate:
 
 
 def alternatives(rounds: Sequence[SearchRound]) -> tuple[Alternative, ...]:
-    """Sets of effects with their posterior weights, the most probable first."""
-    ranked = sorted(rounds[-1].posterior.items(), key=lambda item: (-item[1], item[0]))
-    return tuple(Alternative(names, weight) for names, weight in ranked if weight >= _LEAST_WEIGHT)
+    """Sets of effects with their posterior weights, which add up to one, the most probable first."""
+    listed = {names: weight for names, weight in rounds[-1].posterior.items() if weight >= _LEAST_WEIGHT}
+    ranked = sorted(shares(listed).items(), key=lambda item: (-item[1], item[0]))
+    return tuple(Alternative(names, weight) for names, weight in ranked)
 
 
 def inclusion(sets: Sequence[Alternative]) -> dict[str, float]:

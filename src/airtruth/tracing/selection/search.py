@@ -114,6 +114,7 @@ class _Stated:
                 rounds.append(self._accepting(last, effect, following))
                 last = rounds[-1].tied[0].fit
             if chosen.explains_derivatives:
+                rounds = rounds or [scored(self.sets.problem, last, self.effects, self.seed)]
                 last = self._explained(fitted, last)
             rounds[:1] = [self._with_runner_up(own, fitted, found) for own in rounds[:1]]
         self.advance("score the effects")
