@@ -408,31 +408,25 @@ def test_a_short_first_step_predicts_nothing():
 
 
 def test_steps_of_a_trace_are_never_entered_again():
-    """Refits of later rounds belong to the search, and those of increments to learning."""
+    """Every refit belongs to the search until increments are learned."""
     clock = Clock()
     remaining = Remaining(TRACE_STEPS, clock)
-    steps = (
-        "probe",
-        "check the kinematics",
-        "refit the declared aircraft",
-        "round 1: refit",
-        "round 1: score 33",
-    )
-    search = ("refit vane_arm", "round 2: score 32", "refit gyro_lag", "round 3: score 31")
+    steps = ("probe", "check the kinematics", "refit the declared aircraft")
+    search = ("refit vane_arm", "refit gyro_lag + vane_arm", "refit gyro_lag")
     for what in (*steps, *search):
         remaining.enter(what)
         clock.now += 1.0
-    first = sum(time for _, time in TRACE_STEPS[:5])
-    later = sum(time for _, time in TRACE_STEPS[6:])
-    assert remaining.left_s == pytest.approx((5.0 + later) * 5.0 / first - 4.0)
+    first = sum(time for _, time in TRACE_STEPS[:3])
+    later = sum(time for _, time in TRACE_STEPS[4:])
+    assert remaining.left_s == pytest.approx((TRACE_STEPS[3][1] + later) * 3.0 / first - 3.0)
     remaining.enter("learn increments from what remains")
     remaining.enter("refit increment:Cm over alpha_rad")
     before = remaining.left_s
-    remaining.enter("round 2: score 35 effects")
+    remaining.enter("score the effects")
     remaining.enter("refit increment:CL over alpha_rad")
     assert remaining.left_s == before
     remaining.enter("assess every stage")
-    assert remaining.left_s == pytest.approx(3.5 * 9.0 / 12.1)
+    assert remaining.left_s == pytest.approx(3.5 * 6.0 / 13.5)
 
 
 def test_the_time_that_remains_is_right_within_a_factor_of_one_and_a_half_after_a_fifth():
