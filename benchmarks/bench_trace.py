@@ -22,11 +22,11 @@ from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import sensitivities_of
+from airtruth.tracing.learning.increment_inputs import sensitivities_to
+from airtruth.tracing.learning.increments import shapes
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD
 from airtruth.tracing.model.response import filter_inputs, respond, respond_to
 from airtruth.tracing.prepare import Case, prepare
-from airtruth.tracing.learning.increment_inputs import sensitivities_to
-from airtruth.tracing.learning.increments import shapes
 
 FLIGHTS = 200
 """Flights of the filter that are timed."""

@@ -28,9 +28,8 @@ TRACE_STEPS: Final = (
     ("compare", 0.8),
     ("write", 2.0),
 )
-"""Steps of a trace in their order, by their first words, and the time of each [s]: rounded means over traces of
-data/undeclared/a, b and h, which accept one or two effects. Only the ratios matter. A search that accepts none ends earlier than
-they state, and one of many rounds later, because the number of its refits is not known before."""
+"""Steps of a trace in their order, by their first words, and the time of each [s] (judgement: rounded times of a trace of
+data/undeclared/h, which accepts two effects). Only the ratios matter. A search that accepts none ends earlier than they state."""
 LOOP_STEPS: Final = (
     ("identify before", 1.0),
     *TRACE_STEPS,
