@@ -218,7 +218,7 @@ def _sets(
             min((f.statistic for k, f in known.items() if len(k) <= n and f.sound), default=np.inf)
             for n in (size, size + 1)
         ]
-        if size > 1 and least[1] > least[0] - 0.5 * price(problem):
+        if least[1] > least[0] - 0.5 * price(problem):
             break
     return known
 

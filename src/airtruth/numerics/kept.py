@@ -13,6 +13,10 @@ class Kept(Generic[T]):
 
     A value may not refer to its object, which would then never be freed.
 
+    Parameters
+    ----------
+    most : largest number of values, of which the newest remain; None for no limit.
+
     Examples
     --------
     >>> class Record: ...
@@ -26,7 +30,8 @@ class Kept(Generic[T]):
     0
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int | None = None) -> None:
+        self._most = most
         self._values: dict[int, T] = {}
 
     def __len__(self) -> int:
@@ -48,6 +53,8 @@ class Kept(Generic[T]):
         if number not in self._values:
             weakref.finalize(owner, self._values.pop, number, None)
         self._values[number] = value
+        if self._most is not None and len(self._values) > self._most:
+            self._values.pop(next(iter(self._values)), None)
         return value
 
 

@@ -190,20 +190,11 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) ->
     return result
 
 
-def names_a_sensor(answer: TraceAnswer) -> bool:
-    """Whether an answer names an error that a kinematic check compares."""
-    return any(_key(e.name, e.channel) in ERRORS for e in answer.effects)
-
-
 def excluded(check: CheckResult | None, answer: TraceAnswer) -> list[str]:
-    """A sentence about each error of a sensor that an answer names and a check of all records excludes, without a final period.
+    """A sentence about each error of a sensor that an answer names and a check excludes, without a final period.
 
     A check excludes an error if no set that it allows holds the error, or one that looks the same to the trace, although the
     records would show the size that the trace estimates.
-
-    Parameters
-    ----------
-    check : of all records, held-out ones included; None where they allow none.
     """
     if check is None or check.verdict not in ("errors", "one_of", "agrees"):
         return []
@@ -222,8 +213,8 @@ def excluded(check: CheckResult | None, answer: TraceAnswer) -> list[str]:
         if abs(next(iter(effect.parameters.values())).value - neutral) > abs(visible - neutral):
             words = " or ".join(cause.name.replace(" + ", " with ") for cause in check.possible)
             result.append(
-                f"the trace names {key}, and the kinematic check of all records, held-out ones included, excludes it "
-                f"(possible there: {words}); inspect `airtruth check`"
+                f"the trace names {key}, and the kinematic check of the fitted records excludes it (possible there: {words}); "
+                "inspect `airtruth check`"
             )
     return result
 
@@ -233,16 +224,13 @@ def _margin(one: Finding, dt_s: float) -> float:
     return _SAMPLES * dt_s if one.unit == "s" else 0.0
 
 
-def with_contradictions(
-    answer: TraceAnswer, check: CheckResult | None, dt_s: float, whole: CheckResult | None = None
-) -> TraceAnswer:
+def with_contradictions(answer: TraceAnswer, check: CheckResult | None, dt_s: float) -> TraceAnswer:
     """The answer with its contradictions to a check, which make its effects provisional.
 
     Parameters
     ----------
     check : of the fitted records.
     dt_s : as of `disagreement`.
-    whole : check of all records; what it alone excludes is a note, and does not make the answer provisional.
 
     Notes
     -----
@@ -258,7 +246,7 @@ def with_contradictions(
             "missing effect explains it; run `airtruth check` on single records, because an error may be in one of them alone"
         )
         answer = replace(answer, verdict="unexplained", anomaly=left, remaining=left)
-    found += excluded(whole, answer) if not found else []
+    found += excluded(check, answer) if not found else []
     return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
 
 
@@ -270,7 +258,6 @@ __all__ = [
     "disagreement",
     "excluded",
     "kinematic_check",
-    "names_a_sensor",
     "starts_of",
     "with_contradictions",
     "within_kinematics",

@@ -26,7 +26,6 @@ from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
     kinematic_check,
-    names_a_sensor,
     with_contradictions,
     within_kinematics,
 )
@@ -141,7 +140,7 @@ def answered(own: Begun, shared: Collection[str] = (), write: Write | None = Non
     write : takes the revision of the aircraft and writes it, None for a trace of one motion.
     """
     case, rounds, out, search = own.search.case, own.search.rounds, own.out, own.search
-    motion, options, advance = case.fitted.layout.motion, search.options, search.advance
+    options, advance = search.options, search.advance
     advance("assess every stage on fitted and held-out records")
     stages = assess_stages(case, rounds)
     advance("compare ax with the declared axial force")
@@ -158,10 +157,7 @@ def answered(own: Begun, shared: Collection[str] = (), write: Write | None = Non
         return updated, flown_again(stages, own.declared, updated)
 
     answer = conclude(stages, rounds, publish, own.forced, axial)
-    whole = search.kinematics
-    if case.held is not None and whole is not None and names_a_sensor(answer):
-        whole = kinematic_check(own.logs, own.declared, (), motion)
-    answer = with_contradictions(answer, search.kinematics, search.longest_period_s, whole)
+    answer = with_contradictions(answer, search.kinematics, search.longest_period_s)
     answer = replace(answer, notes=(*own.remarks, *answer.notes))
     return TraceResult(answer, rounds, stages, own.origin)
 

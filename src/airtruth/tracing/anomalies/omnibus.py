@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from airtruth.numerics.kept import Kept
 from airtruth.physics.motion import Motion
 from airtruth.tracing.anomalies.families import Destinations, Series, View, families
 from airtruth.tracing.anomalies.spectrum import lines
@@ -39,6 +40,10 @@ _QUANTILES: Final = (0.02, 0.98)
 """Quantiles of the predicted flow angle that count as its range [-] (judgement)."""
 
 
+_TESTED: Final = Kept[tuple[Whitener, tuple[HypothesisTest, ...]]]()
+"""A fit -> an autoregression of its innovations, and the tests under it."""
+
+
 def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> tuple[HypothesisTest, ...]:
     """Run every test at the optimum of a null hypothesis.
 
@@ -46,6 +51,13 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
     ----------
     null : a fit; whitener : autoregression of its innovations.
     """
+    known = _TESTED.of(null)
+    if known is not None and np.array_equal(known[0].coefficients, whitener.coefficients):
+        return known[1]
+    return _TESTED.keep(null, (whitener, _anomalies(null, problem, whitener)))[1]
+
+
+def _anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> tuple[HypothesisTest, ...]:
     seen = views(null, problem)
     measured, motion = problem.settings.measured, problem.layout.motion
     to_outputs = Destinations.of(motion).output

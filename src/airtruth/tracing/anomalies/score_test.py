@@ -11,16 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
 from airtruth.effects.effect import Effect
+from airtruth.numerics.kept import Kept
 from airtruth.tracing.anomalies.flown import flown
 from airtruth.tracing.inference.direction import Direction, change_along, extended_by, with_freedoms
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.sensitivities import Sensitivities
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener
 from airtruth.tracing.model.response import respond
 
@@ -107,6 +109,37 @@ def directions(effect: Effect, null: PosteriorFit, problem: TraceProblem) -> lis
     return [Direction(effect, (float(x), *rest), first.step) for x in grid]
 
 
+class Beside(NamedTuple):
+    """Directions of the effects that a fit lacks.
+
+    Attributes
+    ----------
+    effects : the effects; by_effect : directions of each.
+    tried : all directions, each with a step that changes the innovations.
+    sensitivities : those of each record, with the directions as further common parameters.
+    """
+
+    effects: tuple[Effect, ...]
+    by_effect: tuple[list[Direction], ...]
+    tried: tuple[Direction, ...]
+    sensitivities: tuple[Sensitivities, ...]
+
+
+_BESIDE: Final = Kept[Beside](most=1)
+"""The newest fit -> its directions, which the score test and the quadratic about the fit share."""
+
+
+def beside(null: PosteriorFit, problem: TraceProblem, effects: Sequence[Effect]) -> Beside:
+    """Directions of effects that a fit lacks, and the sensitivities along them."""
+    known = _BESIDE.of(null)
+    if known is not None and known.effects == tuple(effects):
+        return known
+    by_effect = tuple(directions(effect, null, problem) for effect in effects)
+    tried = tuple(perceptible_step(d, null, problem) for own in by_effect for d in own)
+    extended = tuple(extended_by(null, problem, tried)) if tried else null.sensitivities
+    return _BESIDE.keep(null, Beside(tuple(effects), by_effect, tried, extended))
+
+
 def table(
     null: PosteriorFit, problem: TraceProblem, effects: Sequence[Effect], whitener: Whitener, seed: int
 ) -> ScoreTable:
@@ -118,9 +151,7 @@ def table(
     whitener : autoregression of its innovations.
     seed : seed of the draws behind the p-values of effects with a location.
     """
-    by_effect = [directions(effect, null, problem) for effect in effects]
-    tried = [perceptible_step(d, null, problem) for own in by_effect for d in own]
-    extended = extended_by(null, problem, tried)
+    _, by_effect, tried, extended = beside(null, problem, effects)
     gradient, information = with_freedoms(null, problem, extended, whitener, tried)
     white_gradient, white_information = with_freedoms(
         null, problem, extended, NO_WHITENER, tried, levels=True
@@ -235,4 +266,4 @@ def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.r
     return float((np.count_nonzero(largest >= top) + 1) / (_DRAWS + 1))
 
 
-__all__ = ["Score", "ScoreTable", "directions", "holm", "perceptible_step", "table"]
+__all__ = ["Beside", "Score", "ScoreTable", "beside", "directions", "holm", "perceptible_step", "table"]

@@ -197,6 +197,9 @@ class _Learning:
         tried = [s for s in every if s.variant not in present]
         least = 0.0 if present else self.promising
         screened = _of_each_variant(screen(self.sets.problem, last.null, NO_WHITENER, tried))[:_SHARPENED]
+        first = screened[0].log_evidence if screened else -np.inf
+        if first < _PROMISING * max(evident, least):  # no finer detail makes up for that
+            return ()
         leading = _leading(sharpened(self.sets.problem, last.null, NO_WHITENER, screened), least)
         if not leading or leading[0].log_evidence < evident:
             return ()

@@ -255,7 +255,7 @@ class _BestFirst:
         for i in w.columns:
             if q.columns[i].effect is not None:
                 less = EvaluatedSet(answer.expansion, q, q.without(w, i))
-                if q.in_filter(less.weighed) not in self._fits:
+                if less.in_filter not in self._fits:
                     yield less
 
     def _wants(self, p: EvaluatedSet) -> bool:
@@ -266,7 +266,7 @@ class _BestFirst:
 
     @staticmethod
     def _row(p: EvaluatedSet) -> tuple[frozenset[str], Names, tuple[int, ...]]:
-        return p.quadratic.in_filter(p.weighed), p.names, p.weighed.declaration.wrong
+        return p.in_filter, p.names, p.weighed.declaration.wrong
 
     def _refit(self, p: EvaluatedSet) -> None:
         """Refit a set from its predicted point, and from the declared aircraft where that leads nowhere."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -35,12 +36,12 @@ class EffectColumn:
     tried: int = 1
     freed: tuple[int, ...] = ()
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Key of the effect."""
         return self.effect.key if self.effect is not None else self.of_cause.key
 
-    @property
+    @cached_property
     def label(self) -> str:
         """Name of the effect in sets."""
         return self.effect.label if self.effect is not None else self.of_cause.key

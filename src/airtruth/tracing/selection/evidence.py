@@ -133,21 +133,25 @@ class Quadratic:
     def _size_priors(self) -> SizePriors:
         return size_priors(self.columns)
 
-    def given(self, spread: Array) -> tuple[float, Array, Array]:
+    def given(self, spread: Array) -> tuple[Array, Array, Array]:
         """Log-evidence without any size, and slope and information of the sizes, the declared parameters eliminated.
 
         Parameters
         ----------
-        spread : covariance of the derivatives beyond the declared one.
+        spread : (..., derivatives, derivatives) covariance of the derivatives beyond the declared one.
+
+        Returns
+        -------
+        (...,), (..., sizes) and (..., sizes, sizes).
         """
         k, g, h = self.first, self.slope / self.temper, self.information / self.temper
         turned, gain = self._gain(spread)
         across = h[k:, :k]
         precision, pull = self._told
-        own = -self.offset / self.temper + 0.5 * float(g[:k] @ gain @ g[:k])
-        own -= 0.5 * float(np.linalg.slogdet(turned)[1])
-        slope = g[k:] - across @ gain @ g[:k] - pull
-        return own, slope, h[k:, k:] - across @ gain @ across.T + np.diag(precision)
+        along = gain @ g[:k]
+        own = -self.offset / self.temper + 0.5 * along @ g[:k] - 0.5 * np.linalg.slogdet(turned)[1]
+        slope = g[k:] - along @ across.T - pull
+        return np.asarray(own), slope, h[k:, k:] - across @ gain @ across.T + np.diag(precision)
 
     def most_probable(self, spread: Array, sizes: Array) -> Array:
         """(declared,) the most probable declared parameters at given sizes of all columns."""
@@ -156,8 +160,9 @@ class Quadratic:
         return -self._gain(spread)[1] @ slope
 
     def _gain(self, spread: Array) -> tuple[Array, Array]:
-        k, prior = self.first, self.declared.copy()
-        prior[: self.derivatives, : self.derivatives] += spread
+        k, d = self.first, self.derivatives
+        prior = np.broadcast_to(self.declared, (*spread.shape[:-2], k, k)).copy()
+        prior[..., :d, :d] += spread
         turned = np.eye(k) + self.information[:k, :k] / self.temper @ prior
         return turned, prior @ np.linalg.inv(turned)
 
@@ -180,7 +185,7 @@ class Quadratic:
         for number in range(min(most, 2) + 1):
             for beside in itertools.combinations(special, number):
                 found += self._sets(self._declaration(()), beside, most - number)
-        alone = [(d, self._sets(d, (), min(most, 1))) for d in self._wrong]
+        alone = self._singly(self._wrong, min(most, 1))
         alone.sort(key=lambda pair: -max(w.log_evidence for w in pair[1]))
         for number, (declaration, own) in enumerate(alone):
             found += own
@@ -193,12 +198,12 @@ class Quadratic:
         """A set without one of its effects."""
         columns = tuple(i for i in weighed.columns if i != column)
         spread = weighed.declaration.spread + self._widened(columns)
-        own, slope, information = self.given(spread)
-        own += weighed.declaration.log_odds
+        alone, slope, information = self.given(spread)
+        own = float(alone) + weighed.declaration.log_odds
         if not columns:
             return Weighed((), np.zeros(0), weighed.declaration, own)
         chosen = np.array([columns], dtype=np.int64)
-        sizes, logs = self._laplace(slope, information, chosen)
+        sizes, logs = self._laplace(slope[chosen], _of_pairs(information, chosen), chosen)
         total = own + float(logs[0] + self._odds(chosen)[0])
         return Weighed(columns, sizes[0], weighed.declaration, total)
 
@@ -244,7 +249,7 @@ class Quadratic:
                 for by in WRONG_BY
             ]
             found += grown
-            logs = [self.given(d.spread)[0] + d.log_odds for d in grown]
+            logs = self.given(np.array([d.spread for d in grown]))[0] + [d.log_odds for d in grown]
             best = int(np.argmax(logs))
             if not logs[best] > least:
                 break
@@ -260,11 +265,35 @@ class Quadratic:
         spread[at, at] = (by**2 - 1.0) * np.diag(self.declared)[at]
         return Declaration(wrong, spread, LOG_WRONG * (1 + len(wrong)) - float(np.log(len(WRONG_BY))))
 
+    def _singly(
+        self, declarations: Sequence[Declaration], most: int
+    ) -> list[tuple[Declaration, list[Weighed]]]:
+        """Each declaration with its sets of up to one column that does not widen the derivatives."""
+        if not declarations:
+            return []
+        own, slope, information = self.given(np.array([d.spread for d in declarations]))
+        own = own + [d.log_odds for d in declarations]
+        pool = np.array([i for i, c in enumerate(self.columns) if not c.widens], dtype=np.int64)
+        chosen = np.tile(pool if most else pool[:0], len(own))[:, None]
+        pool = chosen[: len(chosen) // len(own), 0]
+        pushes, variances = slope[:, pool].reshape(-1, 1), information[:, pool, pool].reshape(-1, 1, 1)
+        sizes, logs = self._laplace(pushes, variances, chosen)
+        total = own[:, None] + (logs + self._odds(chosen)).reshape(len(own), -1)
+        kept = total > total.max(axis=1, initial=-np.inf)[:, None] - _NEGLIGIBLE
+        found = []
+        for k, declaration in enumerate(declarations):
+            every = [Weighed((), np.zeros(0), declaration, float(own[k]))]
+            for i in np.flatnonzero(kept[k]):
+                size = sizes[k * len(pool) + i]
+                every.append(Weighed((int(pool[i]),), size, declaration, float(total[k, i])))
+            found.append((declaration, every))
+        return found
+
     def _sets(self, declaration: Declaration, beside: tuple[int, ...], most: int) -> list[Weighed]:
         """Sets of columns that do not widen the derivatives, in addition to ``beside``."""
         spread = declaration.spread + self._widened(beside)
-        own, slope, information = self.given(spread)
-        own += declaration.log_odds
+        alone, slope, information = self.given(spread)
+        own = float(alone) + declaration.log_odds
         found: list[Weighed] = []
         if not beside:
             found.append(Weighed((), np.zeros(0), declaration, own))
@@ -276,7 +305,7 @@ class Quadratic:
             chosen = np.array(rows, dtype=np.int64).reshape(len(rows), len(beside) + number)
             for a, b in itertools.combinations(range(chosen.shape[1]), 2):
                 chosen = chosen[self._apart[chosen[:, a], chosen[:, b]]]
-            sizes, logs = self._laplace(slope, information, chosen)
+            sizes, logs = self._laplace(slope[chosen], _of_pairs(information, chosen), chosen)
             total = own + logs + self._odds(chosen)
             for i in np.flatnonzero(total > total.max(initial=-np.inf) - _NEGLIGIBLE):
                 columns = tuple(chosen[i].tolist())
@@ -292,10 +321,14 @@ class Quadratic:
             total[row] += together.max() - together.sum() + LOG_SAME_EVENT * (len(together) - 1)
         return np.asarray(total)
 
-    def _laplace(self, slope: Array, information: Array, chosen: Ints) -> tuple[Array, Array]:
-        """(sets, number) sizes and (sets,) log-evidence of these; NaN and minus infinity where they are nearly dependent."""
-        number = chosen.shape[1]
-        own = information[chosen[:, :, None], chosen[:, None, :]].copy()
+    def _laplace(self, slope: Array, own: Array, chosen: Ints) -> tuple[Array, Array]:
+        """(sets, number) sizes and (sets,) log-evidence of these; NaN and minus infinity where they are nearly dependent.
+
+        Parameters
+        ----------
+        slope, own : (sets, number), (sets, number, number) slope and information of the sizes of the sets.
+        """
+        number, own = chosen.shape[1], own.copy()
         sizes, logs = np.full(chosen.shape, np.nan), np.full(len(chosen), -np.inf)
         variance = np.diagonal(own, axis1=1, axis2=2)
         scale = np.sqrt(np.where(variance > 0.0, variance, np.inf))
@@ -305,9 +338,9 @@ class Quadratic:
         normal = np.array([0.0 if c.prior is None else c.prior.std**-2.0 for c in self.columns])
         own[:, range(number), range(number)] += normal[chosen]
         inverse = np.linalg.inv(own[sound])
-        x = -np.einsum("nij,nj->ni", inverse, slope[chosen[sound]])
+        x = -np.einsum("nij,nj->ni", inverse, slope[sound])
         std = np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
-        gain = -0.5 * (slope[chosen[sound]] * x).sum(axis=1)
+        gain = -0.5 * (slope[sound] * x).sum(axis=1)
         occam = 0.5 * np.linalg.slogdet(inverse)[1] + 0.5 * number * np.log(2.0 * np.pi)
         sizes[sound] = x
         logs[sound] = gain + occam + self._log_prior(x, std, chosen[sound])
@@ -321,6 +354,11 @@ class Quadratic:
         inside = np.where(falls > 0.0, log_ndtr(beyond / std), 0.0)
         inside += log_ndtr((high - x) / std) + log_ndtr((x - low) / std)
         return np.asarray((density + inside).sum(axis=1))
+
+
+def _of_pairs(information: Array, chosen: Ints) -> Array:
+    """(sets, number, number) information of the columns of each set."""
+    return information[chosen[:, :, None], chosen[:, None, :]]
 
 
 __all__ = ["Declaration", "Quadratic", "Weighed"]

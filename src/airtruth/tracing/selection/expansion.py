@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.numerics.normal_equations import scaled_step
-from airtruth.tracing.anomalies.score_test import LOCATIONS, directions, perceptible_step
+from airtruth.tracing.anomalies.score_test import LOCATIONS, beside
 from airtruth.tracing.inference.causes import Cause
-from airtruth.tracing.inference.direction import eliminated, extended_by
+from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.hypothesis import unconstrained_by
 from airtruth.tracing.inference.posterior import (
     Marginal,
@@ -151,9 +151,8 @@ def expanded(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect
     """
     members = last.hypothesis.effects
     taken = {e.key for e in members}
-    by_effect = [directions(e, last, problem) for e in effects if e.key not in taken]
-    tried = [perceptible_step(d, last, problem) for own in by_effect for d in own]
-    sensitivities = extended_by(last, problem, tried) if tried else last.sensitivities
+    lacking = [e for e in effects if e.key not in taken]
+    _, by_effect, tried, sensitivities = beside(last, problem, lacking)
     terms = [likelihood_terms(s, NO_WHITENER, levels=True) for s in sensitivities]
     marginal = marginal_information(
         problem.priors(last.hypothesis), last.point, terms, levels=True, fixed=last.point.at_bounds

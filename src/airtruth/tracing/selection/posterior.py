@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,10 +30,15 @@ class EvaluatedSet:
     quadratic: Quadratic
     weighed: Weighed
 
-    @property
+    @cached_property
     def names(self) -> Names:
         """Names of the set."""
         return self.quadratic.names(self.weighed)
+
+    @cached_property
+    def in_filter(self) -> frozenset[str]:
+        """Keys of the effects of the set that the filter holds."""
+        return self.quadratic.in_filter(self.weighed)
 
     @property
     def explains_derivatives(self) -> bool:
@@ -45,7 +51,7 @@ class EvaluatedSet:
     def is_refitted(self) -> bool:
         """Whether the fit has the effects of the set, and its own prior of the derivatives."""
         fitted = self.expansion.last.hypothesis
-        own = {e.key for e in fitted.effects} == self.quadratic.in_filter(self.weighed)
+        own = {e.key for e in fitted.effects} == self.in_filter
         return own and (fitted.spread is not None) == self.explains_derivatives
 
     @property

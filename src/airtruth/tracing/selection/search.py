@@ -65,7 +65,7 @@ def _chosen(
     left = {
         names: weight
         for names, weight in found.weights.items()
-        if set(required) <= found.evaluated[names].quadratic.in_filter(found.evaluated[names].weighed)
+        if set(required) <= found.evaluated[names].in_filter
     } or dict(found.weights)
     best = None
     while any(left.values()) and (names := simplest(left)):
