@@ -74,7 +74,8 @@ def measured(batch: Batch) -> list[RunMeasures]:
     samples = max(2.0 * _BAND_HZ * batch.dt_s * q.shape[1], _FITTED + 1.0)
     share = np.maximum(1.0 - left * samples / (samples - _FITTED), 0.0)
     gusts = np.zeros(len(q)) if is_reconstructed(batch.channels) else _gusts_m_s(c, batch.dt_s)
-    severe = _severe_m_s(c)
+    altitude = c["altitude_m"] if "altitude_m" in c else altitude_of_density_m(c["density_kg_m3"])
+    severe = np.array([severe_m_s(float(one)) for one in np.nan_to_num(altitude).mean(axis=1)])
     rms = np.sqrt((rest**2).mean(axis=1))
     # a pitch rate that does not move has no share
     moving = np.ptp(c["q_rad_s"], axis=1) > 0.0
@@ -115,11 +116,16 @@ def _gusts_m_s(c: dict[str, Array], dt_s: float) -> Array:
     return np.asarray(speed.mean(axis=1) * left.std(axis=1))
 
 
-def _severe_m_s(c: dict[str, Array]) -> Array:
-    """Severe turbulence at the altitudes of the runs (runs,) [m/s]; above the sea, so that it is not too low near the ground."""
-    altitude = c["altitude_m"] if "altitude_m" in c else altitude_of_density_m(c["density_kg_m3"])
-    feet = np.clip(np.nan_to_num(altitude).mean(axis=1) / FT, *_COVERED_FT)
-    return np.array([gust_scales("mil-f-8785c", "severe", one * FT).sigma_w_m_s for one in feet])
+def severe_m_s(altitude_m: float) -> float:
+    """Vertical gusts of severe turbulence, rms [m/s] (MIL-F-8785C, 3.7).
+
+    Parameters
+    ----------
+    altitude_m : above the sea, so that the gusts are not too low near the ground [m]; outside the range of the figures, the
+        end of that range counts.
+    """
+    feet = float(np.clip(altitude_m / FT, *_COVERED_FT))
+    return gust_scales("mil-f-8785c", "severe", feet * FT).sigma_w_m_s
 
 
 def _without_line(x: Array) -> Array:
@@ -154,4 +160,4 @@ def _some(bad: Sequence[RunMeasures], all_of_them: Sequence[RunMeasures]) -> str
     return "" if len(all_of_them) == 1 else f" in {len(bad)} of {len(all_of_them)} runs"
 
 
-__all__ = ["FLOOR", "MOST_RUNS", "RunMeasures", "measured", "words"]
+__all__ = ["FLOOR", "MOST_RUNS", "RunMeasures", "measured", "severe_m_s", "words"]

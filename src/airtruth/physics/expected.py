@@ -21,6 +21,7 @@ class Expected:
     sizes : magnitudes of the derivatives of ordinary aircraft [-]: judgement.
     terms : physical meaning of each derivative.
     signs : sign of a derivative, and what the other one is.
+    stiffness : that one of `signs` which has the other sign in an unstable aircraft; empty for none.
     by_interval : whether a derivative counts as undetermined where its interval contains zero; otherwise where its standard
         deviation exceeds its size.
     modal : what the absence of the modal parameters means.
@@ -31,6 +32,7 @@ class Expected:
     signs: Mapping[str, tuple[float, str]]
     by_interval: bool
     modal: str
+    stiffness: str = ""
 
 
 _LONGITUDINAL: Final = Expected(
@@ -53,6 +55,7 @@ _LONGITUDINAL: Final = Expected(
     },
     by_interval=False,
     modal="the short period is not an oscillation about a stable trim (its stiffness is negative)",
+    stiffness="Cmalpha",
 )
 """Expectations on the short period."""
 _LATERAL: Final = Expected(

@@ -203,7 +203,7 @@ class TraceAnswer:
     ----------
     verdict : conclusion; provisional : whether there is a reservation, which the verdict in words or a note states.
     anomaly, remaining : strongest evidence of a missing effect, before any effect is accepted and with the accepted effects.
-    effects : accepted effects, in the order in which they were accepted.
+    effects : accepted effects, the most certain first by `separation_sigma`.
     candidates : every candidate, most significant first.
     error : root mean square errors of each stage, for the fitted and the held-out records; in `channels` the standard
         deviation of each channel. Stages *after* and *control* are absent if no effect is accepted.

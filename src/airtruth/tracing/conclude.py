@@ -97,10 +97,11 @@ def conclude(
     effects = accepted(rounds)
     anomaly, remaining = first.anomaly, remaining_evidence(last)
     covariance = robust_covariance(case.fitted, last.reported)
-    stated = (
+    every = (
         *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
         *explaining_effects(rounds, covariance),
     )
+    stated = tuple(sorted(every, key=lambda e: -e.separation_sigma))
     along = () if axial is None else axial.increments
     declared = with_axial_force(declared_model(case.fitted, rounds, covariance, case.declared), along)
     sets = alternatives(rounds)

@@ -11,6 +11,7 @@ from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.presentation.candidates import probability
 from airtruth.tracing.presentation.derivative_table import MOST_COLUMNS, derivative_table
 from airtruth.tracing.presentation.error_table import MEANING, error_table
+from airtruth.tracing.presentation.odds import odds_lines
 from airtruth.tracing.presentation.text import (
     candidate_lines,
     effect_line,
@@ -33,7 +34,11 @@ Block = tuple[str, ...]
 def as_brief_text(answer: TraceAnswer) -> str:
     """Verdict, effects, and as much of the rest as fits into `MOST_LINES`; the last line states what is left out."""
     head = [
-        (*textwrap.wrap(verdict(answer), WIDTH), *textwrap.wrap(records_line(answer), WIDTH)),
+        tuple(
+            line
+            for words in (verdict(answer), *odds_lines(answer), records_line(answer))
+            for line in textwrap.wrap(words, WIDTH)
+        ),
         tuple(
             line
             for e in answer.effects

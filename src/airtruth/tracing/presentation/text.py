@@ -16,6 +16,7 @@ from airtruth.tracing.inference.causes import DERIVATIVES
 from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import axial_words, error_table
+from airtruth.tracing.presentation.odds import odds_lines
 from airtruth.tracing.presentation.tolerances import tolerance_table
 from airtruth.units import printed
 
@@ -29,7 +30,11 @@ def as_trace_text(answer: TraceAnswer) -> str:
     """The answer of a trace as plain text, with every table."""
     tolerances = tolerance_table(answer)
     blocks = [
-        [*textwrap.wrap(verdict(answer), WIDTH), *textwrap.wrap(records_line(answer), WIDTH)],
+        [
+            line
+            for words in (verdict(answer), *odds_lines(answer), records_line(answer))
+            for line in textwrap.wrap(words, WIDTH)
+        ],
         *([effect_line(e), *effect_details(e, answer.credit.get(e.key))] for e in answer.effects),
         as_text(error_table(answer)).rstrip("\n").splitlines(),
         *([as_text(tolerances).rstrip("\n").splitlines()] if tolerances else []),

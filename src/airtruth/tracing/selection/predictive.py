@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft.dynamics import declared_dynamics
+from airtruth.checks.poor import severe_m_s
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
+from airtruth.physics.expected import EXPECTED
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
@@ -167,9 +169,36 @@ def implausibility(problem: TraceProblem, effect: Effect, own: PosteriorFit) -> 
 
 
 def is_plausible(problem: TraceProblem, own: PosteriorFit) -> bool:
-    """Whether the estimates of every effect of a fit are accepted."""
+    """Whether the estimates of every effect of a fit are accepted, and its derivatives and gusts are possible."""
     named = (e for e in own.hypothesis.effects if not isinstance(e, Increment))
-    return not any(why for e in named for why in implausibility(problem, e, own))
+    is_possible = _has_possible_signs(problem, own) and _has_possible_gusts(problem, own)
+    return is_possible and not any(why for e in named for why in implausibility(problem, e, own))
+
+
+def _has_possible_signs(problem: TraceProblem, own: PosteriorFit) -> bool:
+    """Whether no derivative is significantly of a sign that no aircraft has.
+
+    A derivative that is declared so may have it, and a stiffness may be of either sign.
+    """
+    motion, rows = problem.layout.motion, own.layout.of.common.derivatives
+    expected = EXPECTED.get(motion.name)
+    if expected is None:
+        return True
+    declared = dict(zip(motion.parameters, problem.declared_derivatives.tolist(), strict=True))
+    moved = dict(zip(motion.parameters, own.point.common[rows].tolist(), strict=True))
+    std = dict(zip(motion.parameters, np.sqrt(np.diag(own.covariance)[rows]).tolist(), strict=True))
+    return not any(
+        sign * declared[name] > 0.0 and sign * (declared[name] + moved[name]) < -_ERRORS * std[name]
+        for name, (sign, _) in expected.signs.items()
+        if name != expected.stiffness
+    )
+
+
+def _has_possible_gusts(problem: TraceProblem, own: PosteriorFit) -> bool:
+    """Whether the gusts of most records are no stronger than those of severe turbulence."""
+    level_m_s = np.exp(own.point.per_record[:, problem.layout.per_record.log_gust])
+    severe = [severe_m_s(r.signals.altitude_m) for r in problem.records]
+    return bool(np.median(level_m_s / severe) <= 1.0)
 
 
 def declared_part(problem: TraceProblem, effect: Effect) -> float:
