@@ -190,35 +190,6 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) ->
     return result
 
 
-def excluded(check: CheckResult | None, answer: TraceAnswer) -> list[str]:
-    """A sentence about each error of a sensor that an answer names and a check excludes, without a final period.
-
-    A check excludes an error if no set that it allows holds the error, or one that looks the same to the trace, although the
-    records would show the size that the trace estimates.
-    """
-    if check is None or check.verdict not in ("errors", "one_of", "agrees"):
-        return []
-    findings = {f.name: f for f in check.findings}
-    allowed = {f.name.partition(":")[0] for cause in check.possible for f in cause.errors}
-    result = []
-    for effect in answer.effects:
-        key = _key(effect.name, effect.channel)
-        found = findings.get(key)
-        alike = {name.partition(":")[0] for name in (key, *effect.indistinguishable_from)}
-        if found is None or found.state != "not needed" or alike & allowed or not effect.parameters:
-            continue
-        neutral, visible = (
-            _beyond_declared(replace(found, value=found.declared + x)) for x in (0.0, found.smallest)
-        )
-        if abs(next(iter(effect.parameters.values())).value - neutral) > abs(visible - neutral):
-            words = " or ".join(cause.name.replace(" + ", " with ") for cause in check.possible)
-            result.append(
-                f"the trace names {key}, and the kinematic check of the fitted records excludes it (possible there: {words}); "
-                "inspect `airtruth check`"
-            )
-    return result
-
-
 def _margin(one: Finding, dt_s: float) -> float:
     """Difference that is none: for a time, a share of the sample period [s]."""
     return _SAMPLES * dt_s if one.unit == "s" else 0.0
@@ -246,7 +217,6 @@ def with_contradictions(answer: TraceAnswer, check: CheckResult | None, dt_s: fl
             "missing effect explains it; run `airtruth check` on single records, because an error may be in one of them alone"
         )
         answer = replace(answer, verdict="unexplained", anomaly=left, remaining=left)
-    found += excluded(check, answer) if not found else []
     return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
 
 
@@ -256,7 +226,6 @@ def _key(name: str, channel: str | None) -> str:
 
 __all__ = [
     "disagreement",
-    "excluded",
     "kinematic_check",
     "starts_of",
     "with_contradictions",

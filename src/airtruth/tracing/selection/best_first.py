@@ -65,7 +65,7 @@ def best_first(
     if null is None:
         return None
     free = tuple(e for e in effects if e.parameters[0].low < e.parameters[0].high)
-    return _BestFirst(sets, hypothesis, free, declared, advance).run(null, known)
+    return _BestFirst(sets, null, free, declared, advance).run(known)
 
 
 class _BestFirst:
@@ -74,13 +74,14 @@ class _BestFirst:
     def __init__(
         self,
         sets: SetTable,
-        hypothesis: Hypothesis,
+        null: PosteriorFit,
         effects: tuple[Effect, ...],
         declared: DeclaredCauses,
         advance: Advance,
     ) -> None:
         held = {e.key for e in effects}
-        self.sets, self.hypothesis, self.effects, self.advance = sets, hypothesis, effects, advance
+        self.sets, self.null, self.hypothesis = sets, null, null.hypothesis
+        self.effects, self.advance = effects, advance
         self.causes = tuple(c for c in declared.causes if c.key not in held)
         self.wrong_allowed = declared.wrong_allowed
         self.temper = 1.0
@@ -92,14 +93,15 @@ class _BestFirst:
         self._predicted: dict[frozenset[str], EvaluatedSet] = {}
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
 
-    def run(self, null: PosteriorFit, known: Sequence[Mapping[str, float]]) -> Posterior:
+    def run(self, known: Sequence[Mapping[str, float]]) -> Posterior:
         """Refit set after set until no other one can come within the odds."""
+        null = self.null
         self._fits[frozenset()] = [expanded(self.sets.problem, null)]
-        as_declared = self._as_declared(null)
+        as_declared = self._as_declared()
         if as_declared is not None:
             self._expansions.append(expanded(self.sets.problem, as_declared, self.effects))
         for sizes in known:
-            self._begin_at(null, sizes)
+            self._begin_at(sizes)
         self._tempered(null)
         measured: list[PosteriorFit] = [null]
         seen: list[PosteriorFit] = []
@@ -119,7 +121,7 @@ class _BestFirst:
                 if swept or not self._is_misfit(fitted):
                     break
                 swept = True
-                self._sweep(null)
+                self._sweep()
                 limit = self.refits + REFITS
                 continue
             if not may_begin(self.advance, f"refit {' + '.join(following.names)}"):
@@ -132,26 +134,23 @@ class _BestFirst:
         }
         return Posterior(normalised(logs), evaluated, fits, null, self.refits, self.temper)
 
-    def _begin_at(self, null: PosteriorFit, known: Mapping[str, float]) -> None:
+    def _begin_at(self, known: Mapping[str, float]) -> None:
         """Refit a set from the declared aircraft at known values."""
         effects = tuple(e for e in self.effects if e.key in known and len(e.parameters) == 1)
         if not effects or not may_begin(self.advance, f"refit {' + '.join(e.key for e in effects)}"):
             return
         sizes = np.array([e.parameters[0].size(known[e.key]) for e in effects])
         hypothesis = replace(self.hypothesis, effects=effects)
-        own = self.sets.fit_from_declared(hypothesis, sizes, null)
+        own = self.sets.fit_from_declared(hypothesis, sizes, self.null)
         self.refits += 1
-        if own is not None:
-            self._fits.setdefault(frozenset(e.key for e in effects), []).append(
-                expanded(self.sets.problem, own)
-            )
+        self._enter(own)
 
     def _is_misfit(self, fitted: PosteriorFit) -> bool:
         """Whether a fit leaves an anomaly beyond doubt."""
         tests = anomalies(fitted, self.sets.problem, autoregression(fitted.innovations))
         return len(tests) * min(test.p_value for test in tests) < _MISFIT
 
-    def _sweep(self, null: PosteriorFit) -> None:
+    def _sweep(self) -> None:
         """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it."""
         for effect in self.effects:
             key, first = frozenset((effect.key,)), effect.parameters[0]
@@ -161,15 +160,14 @@ class _BestFirst:
                 return
             hypothesis = replace(self.hypothesis, effects=(effect,))
             size = np.array([(first.sign or 1.0) * first.material])
-            own = self.sets.fit_from_declared(hypothesis, size, null)
+            own = self.sets.fit_from_declared(hypothesis, size, self.null)
             self.refits += 1
-            if own is not None and own.cost < null.cost:
-                self._fits[key] = [expanded(self.sets.problem, own)]
+            self._enter(own)
 
-    def _as_declared(self, null: PosteriorFit) -> PosteriorFit | None:
+    def _as_declared(self) -> PosteriorFit | None:
         """The fit with the declared derivatives: those of the null may have absorbed an effect."""
         spread = (_HELD - 1.0) * self.sets.problem.declared_covariance
-        return self.sets.fit(replace(self.hypothesis, spread=spread), null.point)
+        return self.sets.fit(replace(self.hypothesis, spread=spread), self.null.point)
 
     def _tempered(self, fitted: PosteriorFit) -> bool:
         """Set the ratio of variances to that of a fit; whether it has changed."""
@@ -280,8 +278,12 @@ class _BestFirst:
             self.refits += 1
             if again is not None and (own is None or again.cost < own.cost):
                 own = self.sets.converged(hypothesis, again.point) or again
-        if own is not None:
-            key = frozenset(e.key for e in hypothesis.effects)
+        self._enter(own)
+
+    def _enter(self, own: PosteriorFit | None) -> None:
+        """Keep a refit, unless it is worse than the null that its set contains: it ended far from its optimum."""
+        if own is not None and own.cost <= self.null.cost:
+            key = frozenset(e.key for e in own.hypothesis.effects)
             self._fits.setdefault(key, []).append(expanded(self.sets.problem, own))
 
     def _start(self, p: EvaluatedSet) -> tuple[Hypothesis, Parameters]:

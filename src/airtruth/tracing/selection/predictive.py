@@ -41,8 +41,6 @@ _BEYOND_DOUBT: Final = 25.0
 beside an anomaly beyond doubt)."""
 _DIVERGED: Final = 1e6
 """Residual over the share that gusts and sensors explain, beyond which a free run has diverged [-] (judgement)."""
-_SEVERAL: Final = 3
-"""Number of records from which the scatter between records is estimated [-]; with fewer none may get worse."""
 _AT_END: Final = 1e-6
 """Distance from an end of the range, over the range, at which a size has ended there [-] (judgement: above rounding)."""
 
@@ -273,20 +271,11 @@ def has_converged(own: PosteriorFit, gain: float) -> bool:
 
 
 def _is_loss(gains: Array) -> bool:
-    """Whether the sum of the gains is negative by more than two of its own standard errors.
+    """Whether the records together lose.
 
-    A record that only the effect can follow counts as a gain, one that only the null can follow as a loss. With fewer
-    than three records none may get worse, as their scatter is unknown.
+    One that only the null can follow is a loss, and one that only the effect can follow a gain.
     """
-    if np.isnan(gains).any() or gains.min() == -np.inf:
-        return True
-    gains = gains[np.isfinite(gains)]
-    if gains.size == 0:
-        return False
-    if gains.size < _SEVERAL:
-        return bool(gains.min() < 0.0)
-    error = float(gains.std(ddof=1) * np.sqrt(gains.size))
-    return float(gains.sum()) < -_ERRORS * error
+    return not float(gains.sum()) >= 0.0
 
 
 __all__ = [
