@@ -60,10 +60,19 @@ def test_a_wrong_declaration_is_a_wider_prior():
     q, y, a = linear()
     found = [w for w in q.sets(1) if w.declaration.wrong == (1,) and not w.columns]
     assert len(found) == len(WRONG_BY)
+    odds = np.exp(LOG_WRONG)
+    every = 2.0 * odds + odds**2  # either of two derivatives, or both
     for w, by in zip(found, WRONG_BY, strict=True):
         exact = log_density(y, a[:, :2], np.diag([0.3, 0.5 * by]) ** 2)
-        assert w.log_evidence == pytest.approx(exact + 2.0 * LOG_WRONG - np.log(2.0), abs=1e-8)
+        assert w.log_evidence == pytest.approx(exact + LOG_WRONG - np.log(2.0 * every), abs=1e-8)
         assert q.names(w) == (DERIVATIVES,)
+
+
+def test_wrong_declarations_together_are_as_probable_as_none():
+    q, _, _ = linear()
+    alone = [w.declaration for w in q.sets(1) if w.declaration.wrong and not w.columns]
+    assert len(alone) == 3 * len(WRONG_BY)
+    assert sum(np.exp(d.log_odds) for d in alone) == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("effect", [VANE, EFFECTS["vane_lag"]], ids=["two-sided", "one-sided"])

@@ -44,8 +44,8 @@ WRONG_BY: Final = (3.0, 10.0)
 LOG_SAME_EVENT: Final = -1.0
 """Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
 LOG_WRONG: Final = -1.0
-"""Logarithm of the prior odds of wrong declarations, and of each derivative that they concern [-] (judgement: they are
-the most frequent cause)."""
+"""Logarithm of the prior odds of each further wrong declaration [-] (judgement); all sets of them together are as probable as
+none, whatever the number of derivatives."""
 _SINGULAR: Final = 1e-6
 """Least share of an information that remains beside the others of a set [-] (judgement: less is no other effect)."""
 _NEGLIGIBLE: Final = 15.0
@@ -263,7 +263,8 @@ class Quadratic:
             return Declaration((), spread, 0.0)
         at = list(wrong)
         spread[at, at] = (by**2 - 1.0) * np.diag(self.declared)[at]
-        return Declaration(wrong, spread, LOG_WRONG * (1 + len(wrong)) - float(np.log(len(WRONG_BY))))
+        every = np.log(len(WRONG_BY) * ((1.0 + np.exp(LOG_WRONG)) ** self.derivatives - 1.0))
+        return Declaration(wrong, spread, LOG_WRONG * len(wrong) - float(every))
 
     def _singly(
         self, declarations: Sequence[Declaration], most: int
