@@ -91,7 +91,17 @@ def main() -> None:
                 "--out",
                 f"{folder}/lateral.parquet",
             ],
-            [*shared, "trace", flown, *side, "--effect", "rudder_delay", "--out", f"{folder}/lateral"],
+            [
+                *shared,
+                "trace",
+                flown,
+                *side,
+                "--effect",
+                "rudder_delay",
+                "--increments",
+                "--out",
+                f"{folder}/lateral",
+            ],
         ]
         commands = (identify, trace, *lateral)
         running = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]

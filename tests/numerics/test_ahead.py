@@ -46,12 +46,14 @@ def started(monkeypatch):
     return processes
 
 
-def index_of(kernel, cache):
-    """Write a file with the name of numba's index of a kernel."""
+def index_of(kernel, cache, versions=2):
+    """Write files with the names of numba's index of a kernel and of its versions."""
     module, _, name = kernel.rpartition(".")
     python = f"{sys.version_info.major}{sys.version_info.minor}"
     path = cache / "folder_0123" / f"{module.rpartition('.')[2]}.{name}-1.py{python}.nbi"
     path.parent.mkdir(exist_ok=True)
+    for version in range(versions):
+        path.with_suffix(f".{version + 1}.nbc").write_bytes(b"")
     path.write_bytes(b"")
     return path
 
@@ -60,6 +62,8 @@ def test_a_cache_lacks_a_kernel_without_an_index_as_new_as_its_source(empty_cach
     assert ahead.lacking(TRACE.last)
     path = index_of(TRACE.last, empty_cache)
     assert not ahead.lacking(TRACE.last)
+    assert not ahead.lacking(TRACE.last, TRACE.versions)
+    assert ahead.lacking(TRACE.last, TRACE.versions + 1)
     assert ahead.lacking(IDENTIFY.last)
     os.utime(path, (1.0, 1.0))
     assert ahead.lacking(TRACE.last)
@@ -190,7 +194,7 @@ def test_the_first_run_has_the_bytes_of_the_second(plan, tmp_path):
     for name in names:  # the command and the child compile them for the same types
         module, _, kernel = name.rpartition(".")
         (index,) = tmp_path.glob(f"cache/*/{module.rpartition('.')[2]}.{kernel}-*.nbi")
-        assert len(list(index.parent.glob(f"{index.stem}.*.nbc"))) == 1
+        assert len(list(index.parent.glob(f"{index.stem}.*.nbc"))) == names.count(name)
 
 
 def result(plan, cache, out):

@@ -15,6 +15,7 @@ from airtruth.tracing.kinematic_start import (
     disagreement,
     kinematic_check,
     starts_of,
+    told_by,
     with_contradictions,
     within_kinematics,
 )
@@ -137,6 +138,18 @@ def test_alternatives_of_a_check_are_sets_and_its_airspeed_belongs_to_each():
     )
     check.verdict = "failed"
     assert starts_of(check, 0.02) == starts_of(None, 0.02) == ()
+
+
+def test_an_error_that_every_set_of_a_check_holds_is_told():
+    """With its own standard deviation; one that a set does without, and the airspeed, are not told."""
+    check = airspeed_check("present")
+    arm, scale, other = map(error, ("vane_arm:beta_rad", "gyro_scale:r_rad_s", "vane_scale:beta_rad"))
+    check.possible = tuple(SimpleNamespace(errors=(arm, beside)) for beside in (scale, other))
+    names = ("vane_arm:beta_rad", "gyro_scale:r_rad_s", "vane_scale:beta_rad")
+    check.findings += tuple(Finding(n, "m", "", 13.4, 0.4, 12.6, 14.2, 0.0, 1.0, "present") for n in names)
+    assert told_by(check, 0.02) == {"vane_arm:beta_rad": (13.4, 0.4)}
+    check.verdict = "failed"
+    assert told_by(check, 0.02) == told_by(None, 0.02) == {}
 
 
 @pytest.mark.parametrize(("lag_s", "names"), [(0.0099, ()), (0.0101, ({"vane_lag": 0.0101},))])

@@ -17,7 +17,7 @@ from airtruth.tracing.learning.increment_inputs import FlownMotion, sensitivitie
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.model.response import External, filter_inputs, respond_to
-from airtruth.tracing.model.tangent import FLOWN, POINTS, propagated, tangent_of
+from airtruth.tracing.model.tangent import POINTS, flown_of, propagated, tangent_of
 
 LATE = Change(sensors=(SensorTerm("q_rad_s", "lag", 0.03), SensorTerm("az_m_s2", "delay", 0.015)))
 """Sensors with a lag and a delay."""
@@ -156,7 +156,7 @@ def test_memories_follow_the_motion():
     """A lag, a mode and a play of the elevator against `scipy.signal.lsim` and a loop, on the filter's own grid."""
     _, tangent = flown(*CASES["plain"])
     motion = FlownMotion(tangent, LONGITUDINAL)
-    surface = tangent.matrices.flown[:, :, FLOWN.index("elevator")]
+    surface = tangent.matrices.flown[:, :, flown_of(LONGITUDINAL).index("elevator")]
     series = np.append(surface[:, 0], surface[-1, -1])
     t = np.arange(series.size) * tangent.h_s
     lag = motion.state(Memory("lag", 0.15), "elevator")

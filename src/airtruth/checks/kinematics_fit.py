@@ -29,6 +29,8 @@ EDGE: Final = 1e-3
 ALPHA_SLOPES: Final = (-2.0, 2.0)
 """Range of the slope of a position error [1/rad]: judgement; a static source far from a good position errs by 1 % of the airspeed
 per degree."""
+_KEPT: Final = 64
+"""Number of differences that are kept [-] (judgement: those of a step of a fit in all equations and stacks)."""
 SCALES: Final = (0.4, 2.5)
 """Range of a scale [-]: judgement; an error beyond is one of units, which the gate tests."""
 
@@ -76,6 +78,7 @@ class _Stack:
     equations : of each record.
     std : (records, equations, lines) of `Weight`; trends : (records, equations, trends, lines).
     rows : (records, equations, lines) where each line is among all whitened ones.
+    along : (equations, m, records x samples) components of differences along the pooled motions of the elevator.
     """
 
     record: Samples
@@ -84,6 +87,7 @@ class _Stack:
     std: Array
     trends: Array
     rows: NDArray[np.int64]
+    along: Array
 
 
 def _stacks_of(records: Sequence[Samples], lines: Sequence[Lines], weight: Weight) -> list[_Stack]:
@@ -93,14 +97,22 @@ def _stacks_of(records: Sequence[Samples], lines: Sequence[Lines], weight: Weigh
     for numbers, record in stacked(records):
         std = np.array([list(weight.std[i].values()) for i in numbers])
         own = np.arange(std[0].size).reshape(std.shape[1:])
+        rows, trends = (
+            np.array([first[i] + own for i in numbers]),
+            np.array([weight.trends[i] for i in numbers]),
+        )
+        # the lines, whitening and the removal of trends are linear
+        span = without(np.moveaxis(weight.span[rows], -1, 0), trends) / std
+        along = np.moveaxis(lines[numbers[0]].samples_of(span, record.length), 2, 0)
         result.append(
             _Stack(
                 record=record,
                 lines=lines[numbers[0]],
                 equations=tuple(weight.std[numbers[0]]),
                 std=std,
-                trends=np.array([weight.trends[i] for i in numbers]),
-                rows=np.array([first[i] + own for i in numbers]),
+                trends=trends,
+                rows=rows,
+                along=along.reshape(*along.shape[:2], -1),
             )
         )
     return result
@@ -134,6 +146,11 @@ class KinematicProblem:
     def _stacks(self) -> list[_Stack]:
         return _stacks_of(self.records, self.lines, self.weight)
 
+    @cached_property
+    def _parts(self) -> dict[tuple[object, ...], Array]:
+        """Moments of the last differences by stack, equation, and the errors that move it."""
+        return {}
+
     def white(self, errors: Mapping[str, float]) -> Array:
         """(rows,) whitened lines at given errors, the others as declared; the trends of each difference are taken out."""
         white = np.empty(len(self.weight.span))
@@ -152,7 +169,23 @@ class KinematicProblem:
 
     def moments(self, errors: Mapping[str, float]) -> Array:
         """(m,) components of the whitened lines along the pooled motions of the elevator."""
-        return np.asarray(self.weight.span.T @ self.white(errors))
+        every, parts, total = {**self.known, **errors}, self._parts, np.zeros(self.weight.span.shape[1])
+        for number, stack in enumerate(self._stacks):
+            at = {e: (number, e, *self._moving(e, every)) for e in stack.equations}
+            new = [e for e, key in at.items() if key not in parts]
+            found = self.kinematics.compare(stack.record, every, new) if new else {}
+            for place, (equation, key) in enumerate(at.items()):
+                if equation in new:
+                    parts[key] = stack.along[place] @ found[equation].reshape(-1)
+                total += parts[key]
+        while len(parts) > _KEPT:
+            del parts[next(iter(parts))]
+        return total
+
+    def _moving(self, equation: str, errors: Mapping[str, float]) -> tuple[object, ...]:
+        """The errors that move the difference of an equation, in their order."""
+        movers = self.kinematics.moved_by.get(equation)
+        return tuple(pair for pair in sorted(errors.items()) if movers is None or pair[0] in movers)
 
     def slope(self, name: str, errors: Mapping[str, float], moments: Array) -> Array:
         """(m,) derivative of the moments by one error; ``moments`` are those at the errors."""

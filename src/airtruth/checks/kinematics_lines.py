@@ -20,7 +20,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
+from scipy.fft import dct, idct
 
 from airtruth.checks.kinematics_model import LONGITUDINAL
 from airtruth.checks.kinematics_record import Kinematics, Samples
@@ -63,6 +63,12 @@ class Lines:
     def of(self, x: Array) -> Array:
         """Lines of (..., samples)."""
         return np.asarray(dct(x, axis=-1, norm="ortho")[..., self.keep])
+
+    def samples_of(self, lines: Array, length: int) -> Array:
+        """(..., samples) whose product with samples is that of ``lines`` (..., lines) with the lines of the samples."""
+        every = np.zeros((*lines.shape[:-1], length))
+        every[..., self.keep] = lines
+        return np.asarray(idct(every, axis=-1, norm="ortho"))
 
 
 @dataclass(frozen=True)

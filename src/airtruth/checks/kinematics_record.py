@@ -16,7 +16,10 @@ from airtruth.physics.sensor_errors import KINDS, Kind, error_name
 from airtruth.units import UNITS, printed
 
 Array = NDArray[np.float64]
+V = TypeVar("V")
 
+_KEPT: Final = 8
+"""Number of values of one name that are kept [-] (judgement: a step of a fit moves up to four errors, one after the other)."""
 RATE_HZ: Final = 25.0
 """Smallest sample rate after thinning [Hz]: judgement; the motion of an aircraft lies below 5 Hz."""
 
@@ -60,6 +63,25 @@ class Samples:
     def t(self) -> Array:
         """(samples,) time from the first sample [s]."""
         return np.asarray(np.arange(self.length) * self.dt_s)
+
+    def kept(self, name: str, at: tuple[float, ...], make: Callable[[], V]) -> V:
+        """A value that a fit needs again and again while other errors move.
+
+        Parameters
+        ----------
+        name : of the value; at : what it depends on beside the record; make : makes it.
+        """
+        own = self._kept.setdefault(name, {})
+        if at not in own:
+            if len(own) >= _KEPT:
+                del own[next(iter(own))]
+            own[at] = make()
+        value: V = own[at]
+        return value
+
+    @cached_property
+    def _kept(self) -> dict[str, dict[tuple[float, ...], Any]]:
+        return {}
 
 
 R = TypeVar("R", bound=Samples)
@@ -155,6 +177,7 @@ class Kinematics:
     trends : degree of the polynomial that is free in each equation and record.
     offsets : unknown errors that are free in each record and every set: name -> step of its derivative [SI].
     common : the records may share one noise, where they do not differ by it.
+    moved_by : equation -> names of the errors and offsets that move its difference; one without an entry depends on all.
     """
 
     errors: Mapping[str, InstrumentError]
@@ -169,6 +192,7 @@ class Kinematics:
     trends: int = 1
     offsets: Mapping[str, float] = field(default_factory=dict)
     common: bool = False
+    moved_by: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
 
 def declared_errors(aircraft: Aircraft, kinematics: Kinematics) -> dict[str, float]:

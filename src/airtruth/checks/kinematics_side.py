@@ -21,7 +21,7 @@ from airtruth.checks.lateral_model import fitted, simulated
 from airtruth.checks.pitch_motions import smoothed_surface
 from airtruth.checks.rotation import bank_coupling, heading_rate, side_gravity, sideslip_turn
 from airtruth.checks.samples import derivative, earlier, integral, lagged
-from airtruth.physics.sensor_errors import KINDS, Kind, error_name
+from airtruth.physics.sensor_errors import Kind
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -103,6 +103,10 @@ _ALL: Final = (
 """Each error with its usual size and the step of its derivative (judgement, as in the longitudinal motion)."""
 ERRORS: Final[dict[str, InstrumentError]] = {error.name: error for error in _ALL}
 """Errors that the kinematics can show, by name."""
+_ERROR: Final = {(e.channel, e.kind): (name, e.neutral) for name, e in ERRORS.items()}
+"""Channel and kind -> name and value without error."""
+_GYRO: Final[tuple[Kind, ...]] = ("lag", "delay", "scale")
+"""Kinds of errors of a gyroscope."""
 
 
 def compare(
@@ -120,41 +124,79 @@ def compare(
     """
     dt = record.dt_s
 
-    def error(channel: str, kind: Kind) -> float:
-        return float(errors.get(error_name(channel, kind), KINDS[kind].neutral))
+    def of(channel: str, *kinds: Kind) -> tuple[float, ...]:
+        return tuple(errors.get(name, neutral) for name, neutral in (_ERROR[channel, kind] for kind in kinds))
 
     def rate(channel: str, x: Array, dot: Array) -> Array:
-        late = earlier(x + error(channel, "lag") * dot, dt, error(channel, "delay"))
-        return late / error(channel, "scale")
+        lag, delay, scale = at = of(channel, *_GYRO)
+        return record.kept(channel, at, lambda: earlier(x + lag * dot, dt, delay) / scale)
 
     p_dot, r_dot = record.dots
     p, r = rate("p_rad_s", record.p, p_dot), rate("r_rad_s", record.r, r_dot)
-    bank = earlier(record.bank, dt, error("phi_rad", "delay"))
+    of_p, of_r = of("p_rad_s", *_GYRO), of("r_rad_s", *_GYRO)
+    (phi_late,) = of_phi = of("phi_rad", "delay")
+    bank = record.kept("bank", of_phi, lambda: earlier(record.bank, dt, phi_late))
     result = {}
     if "phi" in equations and record.phi is not None:
-        moved = record.rolled + error("p_rad_s", "lag") * (record.p - record.p[..., :1])
-        rolled = earlier(moved, dt, error("p_rad_s", "delay")) / error("p_rad_s", "scale")
-        rolled = rolled + integral(bank_coupling(record.q, r, bank, record.theta), dt)
-        result["phi"] = record.phi - earlier(rolled, dt, -error("phi_rad", "delay"))
+        lag, delay, scale = of_p
+        rolled = earlier(record.rolled + lag * (record.p - record.p[..., :1]), dt, delay) / scale
+        coupled = record.kept(
+            "coupled",
+            of_r + of_phi,
+            lambda: integral(bank_coupling(record.q, r, bank, record.theta), dt),
+        )
+        result["phi"] = record.phi - earlier(rolled + coupled, dt, -phi_late)
     if "psi" in equations and record.psi is not None:
-        yawed = integral(heading_rate(record.q, r, bank, record.theta), dt)
-        result["psi"] = record.psi - earlier(yawed, dt, -error("psi_rad", "delay"))
+        yawed = record.kept(
+            "yawed", of_r + of_phi, lambda: integral(heading_rate(record.q, r, bank, record.theta), dt)
+        )
+        result["psi"] = record.psi - earlier(yawed, dt, -of("psi_rad", "delay")[0])
     if "beta" in equations and record.beta is not None:
-        ramp = record.t - record.t.mean()
-        alpha = record.alpha - float(errors.get(ALPHA_BIAS, 0.0)) - float(errors.get(ALPHA_DRIFT, 0.0)) * ramp
-        ay = earlier(record.ay, dt, error("ay_m_s2", "delay")) / error("ay_m_s2", "scale")
-        x, z = error("ay_m_s2", "arm"), error("ay_m_s2", "arm_down")
-        ay = ay - record.q * (x * p + z * r)
-        sine = np.sin(record.beta)
-        forward = record.path + G0 * np.sin(alpha - record.theta)
-        force = (ay + side_gravity(record.theta, bank) - forward * sine) / np.sqrt(1.0 - sine**2)
-        # the integral of x r_dot/V is x r/V up to the change of V, which does not matter over a manoeuvre
-        turned = integral(sideslip_turn(p, r, alpha) + force / record.airspeed, dt)
-        turned = turned - (x * (r - r[..., :1]) - z * (p - p[..., :1])) / record.airspeed
-        vane = turned + error("beta_rad", "arm") * r / record.airspeed
-        vane = lagged(earlier(vane, dt, -error("beta_rad", "delay")), dt, error("beta_rad", "lag"))
-        result["beta"] = record.beta - error("beta_rad", "scale") * vane
+        of_air = tuple(float(errors.get(name, 0.0)) for name in (ALPHA_BIAS, ALPHA_DRIFT))
+        of_ay = of("ay_m_s2", "delay", "scale", "arm", "arm_down")
+        turned = record.kept(
+            "turned",
+            of_p + of_r + of_phi + of_air + of_ay,
+            lambda: _turned(
+                record,
+                p,
+                r,
+                record.kept("fall", of_phi, lambda: side_gravity(record.theta, bank)),
+                of_air,
+                of_ay,
+            ),
+        )
+        scale, arm, lag, delay = of("beta_rad", "scale", "arm", "lag", "delay")
+        vane = lagged(earlier(turned + arm * r / record.airspeed, dt, -delay), dt, lag)
+        result["beta"] = record.beta - scale * vane
     return result
+
+
+def _turned(
+    record: SideRecord, p: Array, r: Array, fall: Array, of_air: tuple[float, ...], of_ay: tuple[float, ...]
+) -> Array:
+    """Sideslip that rates and specific force make, up to a constant [rad], of the shape of the channels.
+
+    Parameters
+    ----------
+    p, r : true rates [rad/s]; fall : gravity along body y [m/s2].
+    of_air : constant [rad] and ramp [rad/s] of alpha.
+    of_ay : delay [s], scale [-], and arms [m] of the accelerometer.
+    """
+    dt, (delay, scale, x, z) = record.dt_s, of_ay
+
+    def air() -> tuple[Array, Array, Array]:
+        ramp = record.t - record.t.mean()
+        alpha, sine = record.alpha - of_air[0] - of_air[1] * ramp, np.sin(record.beta)
+        forward = record.path + G0 * np.sin(alpha - record.theta)
+        return alpha, forward * sine, np.sqrt(1.0 - sine**2)
+
+    alpha, along, cosine = record.kept("air", of_air, air)
+    ay = earlier(record.ay, dt, delay) / scale - record.q * (x * p + z * r)
+    force = (ay + fall - along) / cosine
+    # the integral of x r_dot/V is x r/V up to the change of V, which does not matter over a manoeuvre
+    turned = integral(sideslip_turn(p, r, alpha) + force / record.airspeed, dt)
+    return turned - (x * (r - r[..., :1]) - z * (p - p[..., :1])) / record.airspeed
 
 
 def motions(record: SideRecord) -> Array:
@@ -177,6 +219,11 @@ def motions(record: SideRecord) -> Array:
     rows += [*np.gradient(whole[1:3], dt, axis=1), *smooth]
     rows += [lagged(whole[0], dt, share * unit) for share in _SLOW]
     return np.array(rows)
+
+
+def _errors_of(*channels: str) -> frozenset[str]:
+    """Names of the errors of channels."""
+    return frozenset(name for name, error in ERRORS.items() if error.channel in channels)
 
 
 LATERAL: Final = Kinematics(
@@ -203,6 +250,12 @@ LATERAL: Final = Kinematics(
     trends=2,
     offsets={ALPHA_BIAS: 1e-3, ALPHA_DRIFT: 1e-4},
     common=True,
+    moved_by={
+        "phi": _errors_of("p_rad_s", "r_rad_s", "phi_rad"),
+        "psi": _errors_of("r_rad_s", "phi_rad", "psi_rad"),
+        "beta": _errors_of("p_rad_s", "r_rad_s", "phi_rad", "beta_rad", "ay_m_s2")
+        | {ALPHA_BIAS, ALPHA_DRIFT},
+    },
 )
 """The kinematics of the lateral-directional motion (`telling`: judgement, as in the longitudinal motion)."""
 

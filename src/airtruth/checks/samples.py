@@ -46,7 +46,8 @@ def derivative(x: Array, dt_s: float) -> Array:
 def _weighed(x: Array, weights: Array) -> Array:
     """Weighted sums of neighbouring samples along the last axis, where all of them exist."""
     first, count = len(weights) // 2, x.shape[-1] - len(weights) + 1
-    sums: Array = correlate1d(x, weights, axis=-1, mode="nearest")
+    sums = np.empty(x.shape)
+    correlate1d(x, weights, axis=-1, output=sums, mode="nearest")
     return sums[..., first : first + count]
 
 

@@ -15,8 +15,8 @@ IDENTIFY: Final = Ahead(
     "airtruth.identification.regression.ahead", "airtruth.identification.regression.dynamic_kernel._filtered"
 )
 """Kernels of these methods."""
-TRACE: Final = Ahead("airtruth.tracing.model.ahead", "airtruth.tracing.model.tangent._differences")
-"""Kernels of the tracer's filter."""
+TRACE: Final = Ahead("airtruth.tracing.model.ahead", "airtruth.tracing.model.tangent._differences", 2)
+"""Kernels of the tracer's filter, for both motions."""
 
 
 def compile_identification(context: Context, methods: Collection[str], cluster: str | None) -> None:

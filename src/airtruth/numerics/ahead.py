@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import faulthandler
 import functools
+import glob
 import os
 import subprocess
 import sys
@@ -28,7 +29,7 @@ R = TypeVar("R")
 
 HOME: Final = Path(__file__).absolute().parents[2]
 """Folder of the package as the command names it: numba's folder of a kernel depends on links in that name."""
-PATIENCE_S: Final = 120
+PATIENCE_S: Final = 240
 """Time after which the child ends itself [s] (judgement: ten times that of its kernels on one processor)."""
 
 
@@ -39,10 +40,12 @@ class Ahead(NamedTuple):
     ----------
     module : with ``KERNELS``, pairs of a kernel's full name and a call that compiles it, in the order of need.
     last : full name of the kernel that is compiled last.
+    versions : number of types that it is compiled for.
     """
 
     module: str
     last: str
+    versions: int = 1
 
 
 class _Child:
@@ -98,7 +101,7 @@ def compiling(ahead: Ahead) -> Iterator[None]:
     ----------
     ahead : what it compiles.
     """
-    if _running or _processors() < 2 or not lacking(ahead.last):
+    if _running or _processors() < 2 or not lacking(ahead.last, ahead.versions):
         yield
         return
     try:
@@ -112,14 +115,14 @@ def compiling(ahead: Ahead) -> Iterator[None]:
         _running.pop().close()
 
 
-def lacking(kernel: str) -> bool:
-    """Whether numba's cache has no index of a kernel that is as new as its source.
+def lacking(kernel: str, versions: int = 1) -> bool:
+    """Whether numba's cache has no index of a kernel that is as new as its source, or not all of its versions.
 
     It is not where numba keeps kernels elsewhere, or compiles none: a package in a folder that is read-only.
 
     Parameters
     ----------
-    kernel : full name.
+    kernel : full name; versions : number of types that it is compiled for.
     """
     module, _, name = kernel.rpartition(".")
     source = HOME.joinpath(*module.split(".")).with_suffix(".py")
@@ -130,7 +133,11 @@ def lacking(kernel: str) -> bool:
     kept = Path(stated).glob(f"*/{index}") if stated else source.parent.glob(f"__pycache__/{index}")
     try:
         made = source.stat().st_mtime
-        return all(path.stat().st_mtime < made for path in kept)
+        return not any(
+            path.stat().st_mtime >= made
+            and len(list(path.parent.glob(f"{glob.escape(path.stem)}.*.nbc"))) >= versions
+            for path in kept
+        )
     except OSError:  # another process replaces the files
         return False
 

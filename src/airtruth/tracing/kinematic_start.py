@@ -99,6 +99,22 @@ def starts_of(check: CheckResult | None, dt_s: float) -> tuple[dict[str, float],
     return tuple({name: values[name] for name in sorted(one)} for one in sets if one)
 
 
+def told_by(check: CheckResult | None, dt_s: float) -> dict[str, tuple[float, float]]:
+    """Effects that every set of a check holds, as key -> value beyond the declared one and standard deviation [SI].
+
+    The airspeed is left out: `within_kinematics` has what its equation tells.
+
+    Parameters
+    ----------
+    dt_s : as of `starts_of`.
+    """
+    if check is None or check.verdict not in ("errors", "one_of") or not check.possible:
+        return {}
+    needed = set.intersection(*(_effects_of(cause, dt_s) for cause in check.possible))
+    found = (f for f in check.findings if f.name in needed)
+    return {f.name: (_beyond_declared(f), f.std) for f in found if f.name not in AIRSPEED}
+
+
 def _effects_of(cause: PossibleCause, dt_s: float) -> set[str]:
     """Effects of the library that a set of errors names; a share of a sample period is none."""
     return {
@@ -228,6 +244,7 @@ __all__ = [
     "disagreement",
     "kinematic_check",
     "starts_of",
+    "told_by",
     "with_contradictions",
     "within_kinematics",
 ]

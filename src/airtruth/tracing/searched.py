@@ -12,7 +12,7 @@ from airtruth.effects.effect import Effect
 from airtruth.errors import LogError
 from airtruth.tracing.calibration.calibrated import calibrated
 from airtruth.tracing.calibration.noise_colour import beside, later_level
-from airtruth.tracing.kinematic_start import starts_of
+from airtruth.tracing.kinematic_start import starts_of, told_by
 from airtruth.tracing.learning.learn import with_increments
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.options import TraceOptions
@@ -124,6 +124,7 @@ def _rounds(own: Searched, required: Collection[str] = ()) -> tuple[SearchRound,
         own.advance,
         required,
         starts_of(own.kinematics, own.longest_period_s),
+        told_by(own.kinematics, own.longest_period_s),
     )
 
 

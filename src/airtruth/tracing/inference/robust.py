@@ -108,9 +108,9 @@ def _without_own(marginal: slice, slopes: Array, own: Array, mixed: Array) -> tu
 
 
 def _prior_information(problem: TraceProblem, fitted: PosteriorFit) -> Array:
-    """Information of the priors on common parameters and sizes."""
+    """Variance of the slopes of the priors on common parameters and sizes."""
     priors = problem.priors(fitted.hypothesis)
-    return np.asarray(block_diag(priors.common, np.diag(priors.sizes)))
+    return np.asarray(block_diag(priors.common, np.diag(priors.sizes * fitted.hypothesis.prior_weights)))
 
 
 def robust_covariance(problem: TraceProblem, fitted: PosteriorFit) -> Array:

@@ -1,12 +1,14 @@
-"""Calls that compile four of the filter's kernels: an aircraft without forces, and a record of two samples."""
+"""Calls that compile four of the filter's kernels for each motion: an aircraft without forces, and a record of two samples."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from functools import partial
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.tracing.model.equation_slopes import AircraftMoves
 from airtruth.tracing.model.filter import innovations, path_of
 from airtruth.tracing.model.flight_slopes import innovation_slopes
@@ -20,73 +22,138 @@ from airtruth.tracing.model.kernel_input import (
     KernelInput,
     SensorArrays,
 )
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid, LateralPoint
+from airtruth.tracing.model.lateral_slopes import LateralMoves
 from airtruth.tracing.model.linearise import FirstUpdate, linearise
-from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD, state_layout
+from airtruth.tracing.model.parameters import ParameterLayout, core_states, state_layout
 from airtruth.tracing.model.sensor_slopes import GainSlopes, Moved, width_of
 from airtruth.tracing.model.slopes import moving
 from airtruth.tracing.model.steady import without_update
-from airtruth.tracing.model.tangent import FLOWN, matrices_along
+from airtruth.tracing.model.tangent import flown_of, matrices_along
 
-_AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
-"""Inputs at a point."""
+_AXIS: Final = np.array([0.0, 1.0])
+"""Axis of a table."""
 
 
-def _model() -> FilterModel:
-    axis, ones, none = np.array([0.0, 1.0]), np.ones(OUTPUTS), np.empty(0)
-    whole, increments = np.empty(0, dtype=np.int64), np.zeros(SHORT_PERIOD.common.derivatives.stop)
-    return FilterModel(
+class _Kind(NamedTuple):
+    """Types of a motion's aircraft, of its inputs at a point and along a record, and what its parameters move."""
+
+    motion: Motion
+    aircraft: AircraftArrays | LateralAircraft
+    point: type[Any]
+    grid: type[Any]
+    moves: AircraftMoves | LateralMoves
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        return core_states(self.motion)
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs."""
+        return len(self.motion.outputs)
+
+    @property
+    def at(self) -> Any:
+        """Inputs at a point."""
+        return self.point(*[1.0] * len(self.point._fields))
+
+    @property
+    def model(self) -> FilterModel:
+        """A filter without effects."""
+        ones, none, whole = np.ones(self.outputs), np.empty(0), np.empty(0, dtype=np.int64)
+        return FilterModel(
+            self.aircraft,
+            GustModel(*[1.0] * len(GustModel._fields)),
+            EffectArrays(whole.reshape(0, 6), none, none, none, whole.reshape(0, 2), none, none, none),
+            SensorArrays._make([*[ones] * 7, 1.0, ones]),
+            state_layout(whole, self.states, 0.0 * ones, 0.0 * ones, slow=False),
+        )
+
+    @property
+    def given(self) -> KernelInput:
+        """A record of two samples."""
+        zeros, grid = np.zeros((2, self.outputs)), self.grid(*[np.ones(3)] * len(self.grid._fields))
+        of_start = ParameterLayout(self.motion).per_record.start
+        start = np.zeros(of_start.stop - of_start.start)
+        return KernelInput(zeros, zeros, grid, np.empty((0, 0)), 1.0, 2, start, 0.0, self.at, self.model)
+
+
+def _pitch() -> _Kind:
+    increments, states = np.zeros(len(LONGITUDINAL.derivatives)), np.zeros(core_states(LONGITUDINAL))
+    return _Kind(
+        LONGITUDINAL,
         AircraftArrays._make(
-            [*[1.0] * 12, np.zeros((2, 3)), increments, axis, axis, axis, np.zeros((2, 2, 2, 3))]
+            [*[1.0] * 12, np.zeros((2, 3)), increments, _AXIS, _AXIS, _AXIS, np.zeros((2, 2, 2, 3))]
         ),
-        GustModel(*[1.0] * len(GustModel._fields)),
-        EffectArrays(whole.reshape(0, 6), none, none, none, whole.reshape(0, 2), none, none, none),
-        SensorArrays._make([*[ones] * 7, 1.0, ones]),
-        state_layout(whole, CORE, 0.0 * ones, 0.0 * ones, slow=False),
+        AirPoint,
+        GridSignals,
+        AircraftMoves(1.0, np.zeros(3), np.zeros((2, 3)), 0.0, states, states),
     )
 
 
-def _linearise() -> None:
-    linearise(np.zeros(CORE), _AT, _model(), np.empty((CORE, CORE)), np.empty((OUTPUTS, CORE)))
+def _side() -> _Kind:
+    increments, states = np.zeros(len(LATERAL.derivatives)), np.zeros(core_states(LATERAL))
+    signals, controls = len(LATERAL.signals), len(LATERAL.controls)
+    aircraft = LateralAircraft(
+        *[1.0] * 8,
+        trim=np.zeros(signals),
+        neutral_rad=np.zeros(controls),
+        effectiveness=np.ones(controls),
+        cg_shift=0.0,
+        cg_y_m=0.0,
+        yaw_moment_n_m=0.0,
+        constant=np.zeros((2, 3)),
+        increments=increments,
+        alpha_rad=_AXIS,
+        points=np.tile(_AXIS, (signals, 1)),
+        values=np.zeros((signals, 2, 2, 3)),
+    )
+    return _Kind(
+        LATERAL, aircraft, LateralPoint, LateralGrid, LateralMoves(1.0, increments, 0.0, states, states)
+    )
 
 
-def _given() -> KernelInput:
-    zeros = np.zeros((2, OUTPUTS))
-    grid = GridSignals(*[np.ones(3)] * len(GridSignals._fields))
-    return KernelInput(zeros, zeros, grid, np.empty((0, 0)), 1.0, 2, np.zeros(4), 0.0, _AT, _model())
+def _linearise(kind: _Kind) -> None:
+    n, outputs = kind.states, kind.outputs
+    linearise(np.zeros(n), kind.at, kind.model, np.empty((n, n)), np.empty((outputs, n)))
 
 
-def _filter() -> None:
-    given = _given()
-    innovations(given, without_update(given.model), np.empty((2, OUTPUTS)))
+def _filter(kind: _Kind) -> None:
+    innovations(kind.given, without_update(kind.model), np.empty((2, kind.outputs)))
 
 
-def _slopes() -> None:
-    given, width = _given(), width_of(0)
-    aircraft = AircraftMoves(1.0, np.zeros(3), np.zeros((2, 3)), 0.0, np.zeros(CORE), np.zeros(CORE))
-    none = np.zeros(moving(SHORT_PERIOD, 0).size, dtype=np.int64)
+def _slopes(kind: _Kind) -> None:
+    n, outputs, width = kind.states, kind.outputs, width_of(0)
+    none = np.zeros(moving(ParameterLayout(kind.motion), 0).size, dtype=np.int64)
     moved = Moved(
-        aircraft, none, none[:OUTPUTS], np.zeros((OUTPUTS, width)), np.zeros(width), np.zeros((CORE, width))
+        kind.moves, none, none[:outputs], np.zeros((outputs, width)), np.zeros(width), np.zeros((n, width))
     )
     gains = GainSlopes(
-        np.zeros((1, CORE, OUTPUTS, width)),
-        FirstUpdate(np.zeros((1, CORE, OUTPUTS - 1, width)), np.zeros((1, OUTPUTS - 1, width))),
-        np.zeros((1, CORE, width)),
-        np.zeros((1, OUTPUTS, OUTPUTS, width)),
+        np.zeros((1, n, outputs, width)),
+        FirstUpdate(np.zeros((1, n, outputs - 1, width)), np.zeros((1, outputs - 1, width))),
+        np.zeros((1, n, width)),
+        np.zeros((1, outputs, outputs, width)),
     )
-    innovation_slopes(given, moved, path_of(2, CORE, OUTPUTS), gains, 1.0)
+    innovation_slopes(kind.given, moved, path_of(2, n, outputs), gains, 1.0)
 
 
-def _tangent() -> None:
-    given = _given()
-    matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0, np.array([1, 4]), len(FLOWN))
+def _tangent(kind: _Kind) -> None:
+    path = path_of(2, kind.states, kind.outputs)
+    matrices_along(kind.given, path, 1.0, np.array([1, 4]), len(flown_of(kind.motion)))
 
 
-KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (
+_CALLS: Final[tuple[tuple[str, Callable[[_Kind], None]], ...]] = (
     ("airtruth.tracing.model.linearise._differences", _linearise),
     ("airtruth.tracing.model.filter._innovations", _filter),
     ("airtruth.tracing.model.flight_slopes._along", _slopes),
     ("airtruth.tracing.model.tangent._differences", _tangent),
 )
-"""Full name of each kernel, and the call that compiles it."""
+"""Full name of each kernel, and the call that compiles it for a motion."""
+KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = tuple(
+    (name, partial(call, kind)) for kind in (_pitch(), _side()) for name, call in _CALLS
+)
+"""Full name of each kernel, and the call that compiles it, of the longitudinal motion first."""
 
 __all__ = ["KERNELS"]

@@ -6,8 +6,9 @@ Every step of a parameter has a recursion of its own; that of none decides where
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 from numba import njit
@@ -34,6 +35,9 @@ class _Gains(NamedTuple):
     first: FirstUpdate
     direct: Array
     scale: Array
+
+
+G = TypeVar("G", _Gains, GainSlopes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -97,40 +101,49 @@ def slopes_along(
         return _divided(steady, moves), np.zeros(rows - 1)
     samples = lower.size or corner_rad2.shape[1]
     node = lower + (share > 0.5) if lower.size else np.zeros(samples, dtype=np.int64)
-    uncertain = np.zeros(samples, dtype=np.bool_)
-    made: list[_Gains] = []
+    uncertain, places = np.zeros(samples, dtype=np.bool_), np.empty(0, dtype=np.int64)
     more = np.zeros(rows)
     corners = _corners(nodes, moves)
     scale = np.tril(np.linalg.inv(corners.white[:, common, None]) @ corners.white)
     scale[:, common] = np.eye(count)
-
-    def along(every: Array) -> Array:
-        if not lower.size:
-            return np.repeat(every[:1], samples, axis=0)
-        low, by = every[lower], share.reshape(-1, *[1] * (every.ndim - 1))
-        return np.ascontiguousarray(low + by * (every[lower + 1] - low))
-
+    own = _Gains(corners.k_gain, corners.first, corners.direct, scale)
+    made: list[_Gains] = []
     for row in range(rows):
         if row > 0 and moves.h[row] == 0.0:
             made.append(made[0])
             more[row] = more[0]
             continue
-        gains = _Gains(
-            along(corners.k_gain[row]),
-            FirstUpdate(along(corners.first.gain[row]), along(corners.first.share[row])),
-            along(corners.direct[row]),
-            along(scale[row]),
-        )
+        gains = _each(lambda x, row=row: _along(x[row], samples, lower, share), own)
         more[row] = _recursion(gains, corners.row(row), scale[row], node, corner_rad2, uncertain, row == 0)
-        made.append(gains)
+        if row == 0:
+            places = np.flatnonzero(uncertain)
+        made.append(_each(lambda x, at=places: x[at], gains))
     h = np.where(moves.h[1:] == 0.0, 1.0, moves.h[1:])
-    stacked = _Gains(
-        np.stack([own.k_gain for own in made]),
-        FirstUpdate(np.stack([own.first.gain for own in made]), np.stack([own.first.share for own in made])),
-        np.stack([own.direct for own in made]),
-        np.stack([own.scale for own in made]),
-    )
-    return _divided(stacked, moves), (more[1:] - more[0]) / h
+    # where the surface is certain, the gains are the settled ones
+    slopes = _each(lambda x: _along(x, samples, lower, share), _divided(own, moves))
+    _each(partial(_put, places), slopes, _divided(_each(lambda *x: np.stack(x), *made), moves))
+    return slopes, (more[1:] - more[0]) / h
+
+
+def _each(function: Callable[..., Array], *gains: G) -> G:
+    """Apply a function to each array of gains, or of several gains together."""
+    k_gain, first, direct, scale = zip(*gains, strict=True)
+    by_first = FirstUpdate(*(function(*x) for x in zip(*first, strict=True)))
+    return type(gains[0])(function(*k_gain), by_first, function(*direct), function(*scale))
+
+
+def _put(places: Ints, whole: Array, part: Array) -> Array:
+    """Replace some rows."""
+    whole[places] = part
+    return whole
+
+
+def _along(every: Array, samples: int, lower: Ints, share: Array) -> Array:
+    """(samples, ...) values along a record from those at its flight conditions (conditions, ...)."""
+    if not lower.size:
+        return np.repeat(every[:1], samples, axis=0)
+    low, by = every[lower], share.reshape(-1, *[1] * (every.ndim - 1))
+    return np.ascontiguousarray(low + by * (every[lower + 1] - low))
 
 
 class _Nodes(NamedTuple):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import Motion
 from airtruth.physics.terms import QBAR, signals_of
 from airtruth.tracing.model.advance import Steps, Work, advance_motion, advance_sensors, steps_of, work_of
 from airtruth.tracing.model.by_motion import (
@@ -55,8 +55,6 @@ def flown_of(motion: Motion) -> tuple[str, ...]:
     return (*signals_of(motion), *(f"body_{s.name}" for s in motion.signals if s.length is not None))
 
 
-FLOWN: Final = flown_of(LONGITUDINAL)
-"""`flown_of` the pitch plane."""
 _H: Final = 1e-6
 """Step of the differences in a state, a coefficient and a reading [its unit]; judgement: large against rounding, and small
 against the cells of the tables."""
@@ -308,4 +306,4 @@ def _whole_samples(phi: Array, driven: Array, count: int) -> tuple[Array, Array]
     return whole, total
 
 
-__all__ = ["FLOWN", "POINTS", "Tangent", "matrices_along", "propagated", "tangent_of"]
+__all__ = ["POINTS", "Tangent", "matrices_along", "propagated", "tangent_of"]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -39,6 +40,11 @@ _HELD: Final = 1e-4
 deviation)."""
 _MISFIT: Final = 1e-6
 """Probability of the anomaly of the best set below which every effect is refitted alone [-] (judgement: beyond doubt)."""
+NOTHING: Final[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+"""The kinematics tells of no error."""
+_HOPELESS: Final = 30.0
+"""Log-evidence behind the best set from which a refit of one effect is of no use [-] (judgement: twice the Occam factors of
+three further effects)."""
 _SAME: Final = 0.05
 """Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 
@@ -51,6 +57,7 @@ def best_first(
     declared: DeclaredCauses,
     advance: Advance = lambda step: None,
     known: Sequence[Mapping[str, float]] = (),
+    told: Mapping[str, tuple[float, float]] = NOTHING,
 ) -> Posterior | None:
     """Posterior probabilities of the sets of effects; None where not even the declared aircraft can be fitted.
 
@@ -60,12 +67,13 @@ def best_first(
     effects : candidates of the filter; declared : what else changes the derivatives.
     advance : receives the step that begins, or holds the time budget.
     known : sets of effects at which the search begins too: key -> value of the first parameter in its unit.
+    told : what the kinematics alone tells: key -> value of the first parameter and its standard deviation in its unit.
     """
     null = sets.converged(hypothesis, start)
     if null is None:
         return None
     free = tuple(e for e in effects if e.parameters[0].low < e.parameters[0].high)
-    return _BestFirst(sets, null, free, declared, advance).run(known)
+    return _BestFirst(sets, null, free, declared, advance).run(known, told)
 
 
 class _BestFirst:
@@ -93,15 +101,21 @@ class _BestFirst:
         self._predicted: dict[frozenset[str], EvaluatedSet] = {}
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
 
-    def run(self, known: Sequence[Mapping[str, float]]) -> Posterior:
+    def run(self, known: Sequence[Mapping[str, float]], told: Mapping[str, tuple[float, float]]) -> Posterior:
         """Refit set after set until no other one can come within the odds."""
         null = self.null
-        self._fits[frozenset()] = [expanded(self.sets.problem, null)]
+        alone = self._fits[frozenset()] = [expanded(self.sets.problem, null)]
+        for sizes in known:
+            self._begin_at(sizes)
+        self._tempered(self._best().expansion.last)
+        if told and self.temper > 1.0 + _SAME:
+            self.effects = tuple(_informed(e, told.get(e.key), self.temper) for e in self.effects)
+            self._fits = {frozenset(): alone}
+            for sizes in known:
+                self._begin_at(sizes)
         as_declared = self._as_declared()
         if as_declared is not None:
             self._expansions.append(expanded(self.sets.problem, as_declared, self.effects))
-        for sizes in known:
-            self._begin_at(sizes)
         self._tempered(null)
         measured: list[PosteriorFit] = [null]
         seen: list[PosteriorFit] = []
@@ -121,7 +135,7 @@ class _BestFirst:
                 if swept or not self._is_misfit(fitted):
                     break
                 swept = True
-                self._sweep()
+                self._sweep(fitted.cost + self.temper * _HOPELESS)
                 limit = self.refits + REFITS
                 continue
             if not may_begin(self.advance, f"refit {' + '.join(following.names)}"):
@@ -150,8 +164,13 @@ class _BestFirst:
         tests = anomalies(fitted, self.sets.problem, autoregression(fitted.innovations))
         return len(tests) * min(test.p_value for test in tests) < _MISFIT
 
-    def _sweep(self) -> None:
-        """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it."""
+    def _sweep(self, rival: float) -> None:
+        """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it.
+
+        Parameters
+        ----------
+        rival : cost above which a refit is of no use.
+        """
         for effect in self.effects:
             key, first = frozenset((effect.key,)), effect.parameters[0]
             if key in self._fits or len(effect.parameters) > 1:
@@ -160,7 +179,7 @@ class _BestFirst:
                 return
             hypothesis = replace(self.hypothesis, effects=(effect,))
             size = np.array([(first.sign or 1.0) * first.material])
-            own = self.sets.fit_from_declared(hypothesis, size, self.null)
+            own = self.sets.fit_from_declared(hypothesis, size, self.null, rival)
             self.refits += 1
             self._enter(own)
 
@@ -274,7 +293,8 @@ class _BestFirst:
         own = self.sets.converged(hypothesis, start)
         self.refits += 1
         if hypothesis.effects and (own is None or own.cost > before.cost):
-            again = self.sets.fit_from_declared(hypothesis, start.sizes, before)
+            rival = np.inf if own is None else own.cost
+            again = self.sets.fit_from_declared(hypothesis, start.sizes, before, rival)
             self.refits += 1
             if again is not None and (own is None or again.cost < own.cost):
                 own = self.sets.converged(hypothesis, again.point) or again
@@ -282,7 +302,7 @@ class _BestFirst:
 
     def _enter(self, own: PosteriorFit | None) -> None:
         """Keep a refit, unless it is worse than the null that its set contains: it ended far from its optimum."""
-        if own is not None and own.cost <= self.null.cost:
+        if own is not None and not own.outrun and own.cost <= self.null.cost:
             key = frozenset(e.key for e in own.hypothesis.effects)
             self._fits.setdefault(key, []).append(expanded(self.sets.problem, own))
 
@@ -336,4 +356,21 @@ class _BestFirst:
         return logs, evaluated
 
 
-__all__ = ["ODDS", "best_first"]
+def _informed(effect: Effect, told: tuple[float, float] | None, temper: float) -> Effect:
+    """An effect with what the kinematics tells of its size.
+
+    The likelihood of the filter holds the kinematics too, but divided by the ratio of variances. What the kinematics tells alone,
+    without any error of the aerodynamic model, has the share of the information that this leaves out.
+    """
+    first = effect.parameters[0]
+    if told is None or first.reciprocal or len(effect.parameters) > 1:
+        return effect
+    value, std = told
+    share = 1.0 - 1.0 / temper
+    own = replace(
+        first, prior_mean=first.size(value), prior_std=std / float(np.sqrt(share)), prior_weight=temper
+    )
+    return replace(effect, parameters=(own,))
+
+
+__all__ = ["NOTHING", "ODDS", "best_first"]
