@@ -23,6 +23,7 @@ from airtruth.importers.channel_table import (
     Unit,
     unit_factor,
 )
+from airtruth.physics.motion import MOTIONS
 from airtruth.quantity import Strict, explain
 
 CONSTANTS: Final[dict[str, str]] = {
@@ -260,7 +261,7 @@ class MappingFile(Strict):
 
     def _require_own_surfaces(self) -> None:
         """Refuse two surfaces of one combination of two columns: of elevons or a V-tail one of them holds the other motion."""
-        for names in itertools.combinations(("elevator_rad", "aileron_rad", "rudder_rad"), 2):
+        for names in itertools.combinations((c.channel for m in MOTIONS.values() for c in m.controls), 2):
             pair = [self.channels[name] for name in names if name in self.channels]
             if len(pair) < 2 or pair[0].calibration != pair[1].calibration or len(pair[0].places) != 2:
                 continue

@@ -115,7 +115,7 @@ def _check_mirrored(
             raise LogError(
                 f"{source.path}: {name}: the pitch acceleration follows the difference of {first} and {second}, not their mean: "
                 f"the servos are mirrored; state weights = [0.5, -0.5] under [channels.{name}] and the offset of the difference "
-                f"(of elevons the aileron then has [-0.5, -0.5] if {first} is the left one), or weights = [0.5, 0.5] if the mean "
+                f"(of elevons the roll then has [-0.5, -0.5] if {first} is the left one), or weights = [0.5, 0.5] if the mean "
                 "is right"
             )
 
