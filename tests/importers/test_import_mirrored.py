@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from import_flight import DEG, write_csv
+from pydantic import ValidationError
 
 from airtruth.errors import LogError
 from airtruth.importers import import_log
@@ -44,13 +45,31 @@ def test_the_import_names_the_weights(flown, tmp_path):
     write_csv(tmp_path / "f.csv", {"t": t, "L": left, "R": right, **{n: c[n] for n in CHANNELS if n in c}})
     units = ("m_s", "rad", "rad", "rad_s", "m_s2", "m_s2", "kg_m3")
     channels = {n: {"column": n, "unit": u} for n, u in zip(CHANNELS, units, strict=True) if n in c}
-    elevator = {"columns": ["L", "R"], "scale": 0.1, "offset": -150.0, "unit": "deg"}
+    linear = {"scale": 0.1, "offset": -150.0}
+    points = {"calibration": [[1400.0, -10.0], [1600.0, 10.0]]}
 
-    def read(**changes):
-        stated = {"time": {"column": "t"}, "channels": {**channels, "elevator_rad": {**elevator, **changes}}}
-        return import_log(tmp_path / "f.csv", MappingFile.model_validate(stated)).log
+    def read(elevator, aileron=None):
+        stated = {
+            name: {"columns": ["L", "R"], "unit": "deg", **own}
+            for name, own in (("elevator_rad", elevator), ("aileron_rad", aileron))
+            if own is not None
+        }
+        mapping = {"time": {"column": "t"}, "channels": channels | stated}
+        return import_log(tmp_path / "f.csv", MappingFile.model_validate(mapping)).log.channels
 
-    with pytest.raises(LogError, match=r"difference of 'L' and 'R'.*weights = \[0.5, -0.5\] under"):
-        read()
-    made = read(weights=[0.5, -0.5], offset=0.0)
-    np.testing.assert_allclose(made.channels["elevator_rad"], c["elevator_rad"], atol=1e-6)
+    for mean in (linear, points):
+        with pytest.raises(
+            LogError, match=r"difference of 'L' and 'R'.*weights = \[0.5, -0.5\] under.*\[-0.5, -0.5\] if 'L'"
+        ):
+            read(mean)
+    difference, half_sum = {"weights": [0.5, -0.5]}, {"weights": [-0.5, -0.5]}
+    roll_rad = -5.0 * DEG * np.sin(1.3 * t)  # right less left, trailing edge down
+    for made in (
+        read({"scale": 0.1, **difference}, {"scale": 0.1, "offset": 150.0, **half_sum}),
+        read(points | difference, points | half_sum),
+        read({"calibration": [[[1400, -10], [1600, 10]], [[1400, 10], [1600, -10]]]}),
+    ):
+        np.testing.assert_allclose(made["elevator_rad"], c["elevator_rad"], atol=1e-6)
+        np.testing.assert_allclose(made.get("aileron_rad", roll_rad), roll_rad, atol=1e-6)
+    with pytest.raises(ValidationError, match=r"aileron_rad is a multiple of channels.elevator_rad"):
+        read(points | difference, points | {"weights": [-0.5, 0.5]})

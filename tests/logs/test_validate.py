@@ -73,6 +73,12 @@ def test_missing_channels_name_the_nearest_column(log: FlightLog) -> None:
     assert "az_m_s2: required channel is missing" in message
 
 
+def test_a_missing_elevator_names_what_a_mapping_states_of_a_servo_output(log: FlightLog) -> None:
+    message = complaint(replace(log, channels=without(log, "elevator_rad")))
+    assert "a servo output with calibration = [[output, deflection], [output, deflection]]" in message
+    assert "elevons with columns and weights, on import" in message
+
+
 def test_air_data_are_required(log: FlightLog) -> None:
     message = complaint(replace(log, channels=without(log, "density_kg_m3", "altitude_m")))
     assert "density_kg_m3 or altitude_m: one of the two is required" in message

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any, Final, Literal, Self
 
@@ -22,6 +23,7 @@ from airtruth.importers.channel_table import (
     Unit,
     unit_factor,
 )
+from airtruth.physics.motion import MOTIONS
 from airtruth.quantity import Strict, explain
 
 CONSTANTS: Final[dict[str, str]] = {
@@ -213,6 +215,7 @@ class MappingFile(Strict):
             other = "[[manoeuvre]]" if self.manoeuvre else "[time] run"
             raise ValueError(f"[source] structs and {other} both divide the file into runs; keep one")
         self._require_one_origin()
+        self._require_own_surfaces()
         clocked = [f"channels.{name}" for name, channel in self.channels.items() if channel.clock]
         clocked += ["attitude"] if self.attitude and self.attitude.clock else []
         clocked += ["body_velocity"] if self.body_velocity and self.body_velocity.clock else []
@@ -255,6 +258,20 @@ class MappingFile(Strict):
             raise ValueError(
                 "[reconstruct] alpha and [body_velocity] both give alpha_rad; keep one of the two"
             )
+
+    def _require_own_surfaces(self) -> None:
+        """Refuse two surfaces of one combination of two columns: of elevons or a V-tail one of them holds the other motion."""
+        for names in itertools.combinations((c.channel for m in MOTIONS.values() for c in m.controls), 2):
+            pair = [self.channels[name] for name in names if name in self.channels]
+            if len(pair) < 2 or pair[0].calibration != pair[1].calibration or len(pair[0].places) != 2:
+                continue
+            one, other = (dict(zip(c.places, c.weights or (0.5, 0.5), strict=True)) for c in pair)
+            left, right = one
+            if one.keys() == other.keys() and one[left] * other[right] == one[right] * other[left]:
+                raise ValueError(
+                    f"channels.{names[1]} is a multiple of channels.{names[0]}: both weigh {left.column!r} and {right.column!r} "
+                    "alike; reverse the sign of one weight of the channel that is wrong"
+                )
 
 
 def _units_of(table: dict[str, Any], dimensions: dict[str, str], what: str) -> None:

@@ -107,15 +107,16 @@ def _check_mirrored(
     """Refuse a mean of two surfaces that cancels the elevator; weights state that a mean is meant."""
     for name in ("elevator_rad", "elevator_command_rad"):
         one, q = mapping.channels.get(name), series.get("q_rad_s")
-        if one is None or q is None or q.constant or len(one.places) != 2 or one.weights or one.calibrations:
+        if one is None or q is None or q.constant or len(one.places) != 2 or one.weights:
             continue
-        times, read = _read(source, mapping, one.places, f"channels.{name}", one.clock, clock)
+        times, read = _calibrated_columns(source, mapping, name, one, clock)
         if are_mirrored(times.t_s, read, q.t_s, q.values):
+            first, second = map(repr, one.columns)
             raise LogError(
-                f"{source.path}: {name}: the pitch acceleration follows the difference of "
-                f"{' and '.join(map(repr, one.columns))}, not their mean: the servos are mirrored; state "
-                f"weights = [0.5, -0.5] under [channels.{name}] and the offset of the difference, or weights = [0.5, 0.5] if the "
-                "mean is right"
+                f"{source.path}: {name}: the pitch acceleration follows the difference of {first} and {second}, not their mean: "
+                f"the servos are mirrored; state weights = [0.5, -0.5] under [channels.{name}] and the offset of the difference "
+                f"(of elevons the roll then has [-0.5, -0.5] if {first} is the left one), or weights = [0.5, 0.5] if the mean "
+                "is right"
             )
 
 
@@ -161,14 +162,23 @@ def _series(source: Source, mapping: MappingFile, name: str, one: Channel, clock
     if one.value is not None:
         always = clock.t_s if clock is not None else np.array([-np.inf, np.inf])
         return Series(always, np.full(len(always), factor * (one.scale * one.value + zero) + above))
-    times, read = _read(source, mapping, one.places, f"channels.{name}", one.clock, clock)
+    times, read = _calibrated_columns(source, mapping, name, one, clock)
     with np.errstate(invalid="ignore", over="ignore"):  # the gate names what is not finite
-        if one.calibrations:
-            read = np.stack([calibrated(*pair) for pair in zip(read, one.calibrations, strict=True)])
         combined = np.array(one.weights) @ read if one.weights else read.mean(axis=0)
         values = factor * (one.scale * combined + zero) + above
     without_jumps = _TURNING.get(name)
     return replace(times, values=_unwrapped(values, without_jumps) if without_jumps else values)
+
+
+def _calibrated_columns(
+    source: Source, mapping: MappingFile, name: str, one: Channel, clock: Series | None
+) -> tuple[Series, Array]:
+    """Times (values are empty) of a channel and (columns, samples) values of its columns, each by its calibration."""
+    times, read = _read(source, mapping, one.places, f"channels.{name}", one.clock, clock)
+    if not one.calibrations:
+        return times, read
+    with np.errstate(invalid="ignore", over="ignore"):
+        return times, np.stack([calibrated(*pair) for pair in zip(read, one.calibrations, strict=True)])
 
 
 def _attitude(

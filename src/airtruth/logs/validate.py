@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from airtruth.channels import REQUIRED, SIGNALS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
+from airtruth.physics.motion import LONGITUDINAL
 
 Index = NDArray[np.int64]
 
@@ -35,6 +36,13 @@ _GAP: Final = 1.5
 """Least length of a gap [steps]."""
 _POSITIVE: Final = ("airspeed_m_s", "density_kg_m3")
 """Channels whose values must be positive."""
+_NO_VANE: Final = ", or without a vane state [reconstruct] alpha = true,"
+"""Cure of a missing angle of attack: further keys of a mapping."""
+_SERVO: Final = (
+    ", a servo output with calibration = [[output, deflection], [output, deflection]] as measured at two outputs, and elevons "
+    "with columns and weights,"
+)
+"""Cure of a missing control surface: further keys of a mapping."""
 
 
 def validate(log: FlightLog, *, minimum_samples: int = MINIMUM_SAMPLES, source: str = "flight log") -> None:
@@ -100,8 +108,9 @@ def _missing(log: FlightLog) -> Iterator[str]:
         if name not in log.channels:
             near = difflib.get_close_matches(name, present, n=1, cutoff=0.5)
             step = f"the nearest column is {near[0]!r}: map it" if near else "map a column to it"
-            if name == "alpha_rad" and not near:
-                step += ", or without a vane state [reconstruct] alpha = true,"
+            if not near:
+                controls = [one.channel for one in LONGITUDINAL.controls]
+                step += _NO_VANE if name == "alpha_rad" else _SERVO if name in controls else ""
             yield f"{name}: required channel is missing ({SIGNALS[name].description}); {step} on import"
     if "density_kg_m3" not in log.channels and "altitude_m" not in log.channels:
         yield "density_kg_m3 or altitude_m: one of the two is required, both are missing; map one on import"

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.band_limited import band_limited, is_band_limited
 from airtruth.numerics.intersample import servo_bend, servo_decay
 from airtruth.tracing.model.servo_surface import (
     held_command,
@@ -75,6 +76,8 @@ def read_between(
                 mean if path is None else shaped(mean, path, cells), corners if limited.any() else none
             )
     corners = corner_variance(surface, std_rad)
+    if corners.size and is_band_limited(surface):
+        return Between(band_limited(surface, cells))
     if servo_s <= 0.0 or not corners.size:
         return Between(_bent(surface, np.zeros_like(bend), cells, corners), corners)
     smoothed = _bent(surface, np.zeros_like(bend), cells, none)
