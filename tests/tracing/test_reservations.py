@@ -7,10 +7,11 @@ from scipy.stats import norm
 
 from airtruth.quantity import Ratio
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
+from airtruth.tracing.anomalies.significance import LEVEL
 from airtruth.tracing.answer import Alternative, DeclaredModel, DerivativeShift
 from airtruth.tracing.declared_model import traceable_errors
 from airtruth.tracing.notes import within_assumed_uncertainty, worse_held_out
-from airtruth.tracing.reservations import DOUBT, MANY, causes, reservations
+from airtruth.tracing.reservations import MANY, causes, reservations
 from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
 
@@ -49,9 +50,7 @@ def test_names_beside_derivatives_without_a_cause_are_provisional():
     and wrong derivatives, without reservation."""
     assert reservations(effects("derivatives"), ()) == ()
     (reason,) = reservations(effects("thrust_moment", "derivatives"), ())
-    assert reason.startswith(
-        "no cause is named for the changed derivatives, and it may also have caused what thrust_moment explains"
-    )
+    assert "(changed derivatives), and its cause may also explain what thrust_moment explains:" in reason
 
 
 def test_an_axial_force_beside_another_effect_is_provisional():
@@ -59,17 +58,18 @@ def test_an_axial_force_beside_another_effect_is_provisional():
     along = AcceptedEffect("increment", {}, 1e-9, 5.0, variant="CX over alpha_rad", acts_on="CX")
     assert reservations([along], ()) == ()
     (reason,) = reservations([*effects("vane_scale"), along], ())
-    assert "a wrong name instead of vane_scale" in reason
+    assert (
+        "(an axial force other than the declared one), and its cause may also explain what vane_scale explains"
+        in reason
+    )
     (reason,) = reservations([*effects("increment"), along], ())
-    assert "a wrong name instead of increment" in reason
+    assert "what increment explains:" in reason
 
 
 def test_a_cause_that_is_improbable_is_provisional():
     sets = [Alternative(("inertia_error", "mass_error"), 0.28), Alternative(("airspeed_scale",), 0.14)]
     (reason,) = reservations(effects("inertia_error", "mass_error"), sets)
-    assert reason.startswith(
-        "the sets of causes without inertia_error, mass_error are together more probable"
-    )
+    assert "weak: the sets of causes without inertia_error, mass_error are together more probable" in reason
     assert reservations(effects("vane_lag"), [Alternative(("vane_lag",), 0.5)]) == ()
     assert reservations(effects("increment"), sets) == ()
 
@@ -91,14 +91,14 @@ def test_names_that_increments_replace_are_provisional():
     sets = [Alternative(("cl_alpha_nonlinear", "cm_alpha_nonlinear"), 0.8), Alternative(("increment",), 0.2)]
     (reason,) = reservations(effects("cl_alpha_nonlinear", "cm_alpha_nonlinear"), sets)
     assert reason.startswith(
-        "learned increments explain the records without cl_alpha_nonlinear, cm_alpha_nonlinear"
+        "the evidence for cl_alpha_nonlinear, cm_alpha_nonlinear is weak: learned increments"
     )
     assert "20 %" in reason
 
 
 def test_names_beside_an_increment_are_provisional():
     (one,) = reservations(effects("vane_arm", "increment"), ())
-    assert "what vane_arm explains:" in one
+    assert "(a learned increment), and its cause may also explain what vane_arm explains:" in one
     two, many = reservations(effects("vane_arm", "cg_shift", "gyro_lag", "increment"), ())
     assert "what vane_arm, cg_shift, gyro_lag explain:" in two
     assert "or more" in many
@@ -140,26 +140,24 @@ def test_a_name_without_a_sure_or_a_usual_size_is_provisional(name, parameter, v
     effect = AcceptedEffect(name, {parameter: ParameterEstimate(value, 0.05, ci95)}, 1e-9, 5.0)
     found = reservations([effect], ())
     assert len(found) == bool(reason)
-    assert "".join(found).startswith(reason)
+    assert reason in "".join(found)
 
 
 def test_a_name_of_a_declared_model_that_is_not_contradicted_is_provisional():
     """`consistent` of the declared model is a p-value above 0.5 %."""
     (reason,) = reservations(effects("airspeed_scale"), (), declared_p_value=0.0051)
-    assert reason.startswith("the evidence against the declared model is weak (p = 0.0051)")
+    assert reason.startswith("the evidence for airspeed_scale is weak: p = 0.0051 for the declared model")
     assert reservations(effects("airspeed_scale"), (), declared_p_value=0.005) == ()
     assert reservations(effects("increment"), (), declared_p_value=0.013) == ()
     (reason,) = reservations(effects("increment"), (), declared_p_value=0.06)
-    assert "(p = 0.06): what is learned is provisional" in reason
+    assert reason.startswith("the evidence for what is learned is weak: p = 0.06 for the declared model")
 
 
 def test_a_name_of_weak_evidence_among_all_candidates_is_provisional():
     """Unmodelled 33 of seed 20262217: a step of Cm was called a lag of lift, p = 0.013."""
     weak = [replace(e, p_value=0.013) for e in effects("lift_alpha_dot")]
     (reason,) = reservations(weak, ())
-    assert reason.startswith(
-        "the evidence for lift_alpha_dot alone is weak among all candidates (p above 0.01)"
-    )
+    assert "weak: p is above 0.01 for lift_alpha_dot alone among all candidates" in reason
     assert reservations([replace(weak[0], p_value=0.01)], ()) == ()
 
 
@@ -167,14 +165,14 @@ def test_of_several_names_each_needs_stronger_evidence():
     one, other = (replace(e, p_value=1e-9) for e in effects("lift_alpha_dot", "vane_lag"))
     assert reservations([one, replace(other, p_value=2e-5)], ()) == ()
     (reason,) = reservations([one, replace(other, p_value=2.1e-5)], ())
-    assert reason.startswith("the evidence for vane_lag alone is weak among all candidates (p above 2e-05)")
+    assert "weak: p is above 2e-05 for vane_lag alone among all candidates" in reason
 
 
 def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
     for name in ("vane_lag", "vane_scale"):
-        (reason,) = reservations(effects(name), (), friction_p_value=DOUBT)
+        (reason,) = reservations(effects(name), (), friction_p_value=LEVEL)
         assert f"beside {name}" in reason
-        assert reservations(effects(name), (), friction_p_value=1.01 * DOUBT) == ()
+        assert reservations(effects(name), (), friction_p_value=1.01 * LEVEL) == ()
     assert reservations(effects("gyro_lag", "cg_shift"), (), friction_p_value=1e-9) == ()
 
 
@@ -184,7 +182,7 @@ def test_a_vane_that_is_no_later_than_a_friction_makes_it_in_gusts_is_provisiona
     assert "looks like a lag of 5 ms, and vane_lag is not larger" in reason
     assert reservations([late], (), friction_lag_s=0.0049) == ()
     assert reservations(effects("gyro_lag", "vane_scale"), (), friction_lag_s=1.0) == ()
-    assert len(reservations([late], (), friction_p_value=DOUBT, friction_lag_s=0.0051)) == 1
+    assert len(reservations([late], (), friction_p_value=LEVEL, friction_lag_s=0.0051)) == 1
 
 
 def shift(declared, declared_std, estimate, std):

@@ -1,7 +1,8 @@
 """Reservations: what makes the names of an answer provisional although they leave no anomaly.
 
-An effect outside the library can look like several named ones together. Each further name fits more of it, so that a good fit by
-many names is weaker evidence for each of them than a good fit by one.
+There are five: part of what the records show has no name, there are many causes, the evidence is weak, a size is unusual, and a
+friction of the vane looks the same. An effect outside the library can look like several named ones together. Each further name
+fits more of it, so that a good fit by many names is weaker evidence for each of them than a good fit by one.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import VANES
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
+from airtruth.tracing.anomalies.significance import LEVEL
 from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
 from airtruth.tracing.friction import PLAUSIBLE_RAD, is_late_vane
 from airtruth.tracing.inference.causes import DERIVATIVES
@@ -31,13 +33,6 @@ a reservation in the trials of leave-one-out, slow, triple and unmodelled, two n
 WEAK_OF_SEVERAL: Final = 2e-5
 """The same of each of several names [-]: a gain of 25 in 2 log L, because one effect that the library lacks can look like several
 of unequal evidence (judgement)."""
-UNNAMED: Final = 0.05
-"""Posterior weight of increments without any name from which the names are provisional [-] (convention)."""
-UNSHOWN: Final = 0.05
-"""P-value of the declared model above which an increment without a name is provisional [-] (convention): without a missing
-effect, a mode was learned in one of 40 flights of a small aircraft."""
-DOUBT: Final = 0.05
-"""Probability of the test of a friction of the vane below which a named error of the vane is provisional [-] (convention)."""
 UNUSUAL: Final = 3.0
 """Size of a named cause over the standard deviation of its prior from which the names are provisional [-] (convention)."""
 _AXIAL: Final = "CX"
@@ -53,6 +48,9 @@ def reservations(
 ) -> tuple[str, ...]:
     """Each reason against relying on the names of an answer, in words.
 
+    The level of significance of the declared model where an increment has no name, of the posterior weight of increments without
+    any name, and of the friction of the vane is `LEVEL`.
+
     Parameters
     ----------
     effects : those of the answer, the explanation of its derivatives among them.
@@ -62,92 +60,96 @@ def reservations(
     friction_lag_s : lag of the vane that a plausible friction imitates in these records, see `friction.imitated_lag_s` [s].
     """
     named = [e for e in effects if e.acts_on is None]
-    listed = ", ".join(e.key for e in named)
-    found = [*_beside_derivatives(named)]
-    beside = [e for e in effects if e.acts_on != _AXIAL]
-    if beside and len(beside) < len(effects):
-        found.append(
-            f"ax contradicts the declared axial force; a wrong name instead of {', '.join(e.key for e in beside)} "
-            "would contradict it as well, so both are provisional"
-        )
-    if named and len(named) < len(beside):
-        found.append(
-            f"the library lacks an effect of these records, which may also have caused what {listed} explain"
-            f"{'' if len(named) > 1 else 's'}: the names are provisional until a flight of their own confirms them"
-        )
+    found = list(_unnamed(effects, named))
     if causes(named) >= MANY:
         found.append(
-            f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
-            "provisional until a flight of their own confirms each"
+            f"{_keys(named)} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names "
+            "are provisional until a flight of their own confirms each"
         )
-    found += _weak(named, bool(beside), declared_p_value)
-    unsure = [e.key for e in named if _contains_neutral(e)]
-    if unsure:
+    reasons = [*_weak(effects, named, declared_p_value), *_improbable(effects, named, sets)]
+    if reasons:
+        subject = f"for {_keys(named)}" if named else "for what is learned"
         found.append(
-            f"the 95 % interval{'s' if len(unsure) > 1 else ''} of {', '.join(unsure)} "
-            f"contain{'' if len(unsure) > 1 else 's'} the value without any effect: the names are provisional"
+            f"the evidence {subject} is weak: {'; '.join(reasons)}. It is provisional until another flight shows it again"
         )
-    large = [e.key for e in named if _deviation(e) > UNUSUAL]
+    large = [e for e in named if _deviation(e) > UNUSUAL]
     if large:
         found.append(
-            f"{', '.join(large)} of such a size {'are' if len(large) > 1 else 'is'} improbable a priori, and a cause "
+            f"{_keys(large)} of such a size {'are' if len(large) > 1 else 'is'} improbable a priori, and a cause "
             "that the library lacks can look the same: the names are provisional until a measurement on the ground confirms them"
         )
-    doubtful = [e.key for e in named if _probability(e, sets) < LEAST_INCLUSION]
+    return (*found, *_friction(named, friction_p_value, friction_lag_s))
+
+
+def _keys(effects: Sequence[AcceptedEffect]) -> str:
+    return ", ".join(e.key for e in effects)
+
+
+def _unnamed(effects: Sequence[AcceptedEffect], named: Sequence[AcceptedEffect]) -> Iterator[str]:
+    """Part of what the records show has no name of a cause."""
+    beside = [e for e in effects if e.acts_on != _AXIAL]
+    others = [e for e in named if e.name != DERIVATIVES]
+    parts = ["changed derivatives"] if 0 < len(others) < len(named) else []
+    parts += ["a learned increment"] if 0 < len(named) < len(beside) else []
+    parts += ["an axial force other than the declared one"] if 0 < len(beside) < len(effects) else []
+    explained = others or beside
+    if parts:
+        yield (
+            f"the library has no name for part of what the records show ({', '.join(parts)}), and its cause may also explain "
+            f"what {_keys(explained)} explain{'' if len(explained) > 1 else 's'}: the names are provisional until a flight of "
+            "their own confirms them"
+        )
+
+
+def _weak(
+    effects: Sequence[AcceptedEffect], named: Sequence[AcceptedEffect], declared_p_value: float
+) -> Iterator[str]:
+    """Why the evidence of tests and intervals is weak."""
+    if any(e.acts_on != _AXIAL for e in effects) and declared_p_value > (DECLARED_LEVEL if named else LEVEL):
+        yield f"p = {declared_p_value:.2g} for the declared model"
+    level = WEAK if len(named) < 2 else WEAK_OF_SEVERAL
+    weak = [e for e in named if e.p_value > level]
+    if weak:
+        yield f"p is above {level:g} for {_keys(weak)} alone among all candidates"
+    unsure = [e for e in named if _contains_neutral(e)]
+    if unsure:
+        many = len(unsure) > 1
+        yield (
+            f"the 95 % interval{'s' if many else ''} of {_keys(unsure)} contain{'' if many else 's'} the value without any effect"
+        )
+
+
+def _improbable(
+    effects: Sequence[AcceptedEffect], named: Sequence[AcceptedEffect], sets: Sequence[Alternative]
+) -> Iterator[str]:
+    """Why the posterior of the names is low."""
+    doubtful = [e for e in named if _probability(e, sets) < LEAST_INCLUSION]
     if sets and doubtful:
-        found.append(
-            f"the sets of causes without {', '.join(doubtful)} are together more probable than those with: the names are "
-            "provisional"
-        )
+        yield f"the sets of causes without {_keys(doubtful)} are together more probable than those with"
     unnamed = sum(s.weight for s in sets if s.effects == (NAME,))
-    if named and len(named) == len(effects) and unnamed > UNNAMED:
-        found.append(
-            f"learned increments explain the records without {listed}, with a posterior weight of {100.0 * unnamed:.0f} %: the "
-            "names are provisional"
-        )
+    if named and len(named) == len(effects) and unnamed > LEVEL:
+        yield f"learned increments explain the records without any name, with a posterior weight of {100.0 * unnamed:.0f} %"
+
+
+def _friction(named: Sequence[AcceptedEffect], p_value: float, lag_s: float) -> Iterator[str]:
+    """A friction of the vane, which in gusts looks like a lag."""
     of_vane = [
-        e.key
+        e
         for e in named
         if e.key in EFFECTS and set(EFFECTS[e.key].channels) <= VANES and EFFECTS[e.key].channels
     ]
-    late = [e.key for e in named if is_late_vane(e.key) and 0.0 < _value(e) <= friction_lag_s]
-    if of_vane and friction_p_value <= DOUBT:
-        found.append(
-            f"the vane moves less than gyro and accelerometer show where the motion turns (p = {friction_p_value:.2g} beside "
-            f"{', '.join(of_vane)}), and in gusts a friction of the vane looks like a lag: the name is provisional until the "
+    late = [e for e in named if is_late_vane(e.key) and 0.0 < _value(e) <= lag_s]
+    if of_vane and p_value <= LEVEL:
+        yield (
+            f"the vane moves less than gyro and accelerometer show where the motion turns (p = {p_value:.2g} beside "
+            f"{_keys(of_vane)}), and in gusts a friction of the vane looks like a lag: the name is provisional until the "
             "vane has been moved by hand on the ground with the log running"
         )
     elif late:
-        found.append(
+        yield (
             f"in the gusts of these records, a friction of the vane of {PLAUSIBLE_RAD / DEG:.1g} deg looks like a lag of "
-            f"{1e3 * friction_lag_s:.0f} ms, and {', '.join(late)} is not larger: the name is provisional until a flight in "
+            f"{1e3 * lag_s:.0f} ms, and {_keys(late)} is not larger: the name is provisional until a flight in "
             "calm air shows it again, or until the vane has been moved by hand on the ground with the log running"
-        )
-    return tuple(found)
-
-
-def _beside_derivatives(named: Sequence[AcceptedEffect]) -> Iterator[str]:
-    others = [e.key for e in named if e.name != DERIVATIVES]
-    if 0 < len(others) < len(named):
-        yield (
-            f"no cause is named for the changed derivatives, and it may also have caused what {', '.join(others)} "
-            f"explain{'' if len(others) > 1 else 's'}: the names are provisional until a flight of their own confirms them"
-        )
-
-
-def _weak(named: Sequence[AcceptedEffect], has_effects: bool, declared_p_value: float) -> Iterator[str]:
-    if has_effects and declared_p_value > (DECLARED_LEVEL if named else UNSHOWN):
-        meant = "the names are" if named else "what is learned is"
-        yield (
-            f"the evidence against the declared model is weak (p = {declared_p_value:.2g}): {meant} provisional until "
-            "another flight shows it again"
-        )
-    level = WEAK if len(named) < 2 else WEAK_OF_SEVERAL
-    weak = [e.key for e in named if e.p_value > level]
-    if weak:
-        yield (
-            f"the evidence for {', '.join(weak)} alone is weak among all candidates (p above {level:g}), and a cause that the "
-            "library lacks can look the same: the names are provisional until another flight shows them again"
         )
 
 
@@ -197,15 +199,4 @@ def causes(named: Sequence[AcceptedEffect]) -> int:
     return events([e.key for e in named])
 
 
-__all__ = [
-    "DOUBT",
-    "LEAST_INCLUSION",
-    "MANY",
-    "UNNAMED",
-    "UNSHOWN",
-    "UNUSUAL",
-    "WEAK",
-    "WEAK_OF_SEVERAL",
-    "causes",
-    "reservations",
-]
+__all__ = ["LEAST_INCLUSION", "MANY", "UNUSUAL", "WEAK", "WEAK_OF_SEVERAL", "causes", "reservations"]
