@@ -114,6 +114,13 @@ def test_a_line_that_states_the_delimiter(tmp_path):
     holds_the_rows(source, ["t", "a", "v"])
 
 
+@pytest.mark.parametrize(("delimiter", "names"), [(",", "t,a,v"), (WHITESPACE, "t a v")])
+@pytest.mark.parametrize("end", ["\n", "\n\n\n", "\n  \n", "\n\t", "\r\n\r\n"])
+def test_blank_lines_at_the_end_are_no_rows(tmp_path, delimiter, names, end):
+    content = table(names, delimiter="," if delimiter == "," else " ").rstrip("\n") + end
+    holds_the_rows(read(tmp_path, content, delimiter=delimiter), ["t", "a", "v"])
+
+
 @pytest.mark.parametrize(
     ("form", "start"),
     [

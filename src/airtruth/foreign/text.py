@@ -50,8 +50,9 @@ def read_text(path: Path, layout: TextFormat) -> Source:
     """
     text, encoding, notes = decoded(path, layout.encoding)
     lines = text.split("\n")
-    while lines and not lines[-1]:
-        lines.pop()
+    blank = []
+    while lines and not lines[-1].strip():
+        blank.append(lines.pop())
     first = layout.skip_rows
     stated = delimiter_line(lines[0]) if lines else None
     if stated is not None and not layout.skip_rows:
@@ -74,7 +75,7 @@ def read_text(path: Path, layout: TextFormat) -> Source:
         raise StoreError(f"{path}: {error}") from None
     if table.first >= len(rows):
         raise StoreError(f"{path}: holds a header and no rows; export it again")
-    plain = not comments and encoding == "utf-8"
+    plain = not comments and encoding == "utf-8" and blank in ([], [""])
     frame = _frame(path, None if plain else "\n".join(rows), layout, table)
     frame = _named_columns(path, frame, table)
     columns, dates = [], []
