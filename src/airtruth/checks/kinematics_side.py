@@ -253,8 +253,7 @@ LATERAL: Final = Kinematics(
     moved_by={
         "phi": _errors_of("p_rad_s", "r_rad_s", "phi_rad"),
         "psi": _errors_of("r_rad_s", "phi_rad", "psi_rad"),
-        "beta": _errors_of("p_rad_s", "r_rad_s", "phi_rad", "beta_rad", "ay_m_s2")
-        | {ALPHA_BIAS, ALPHA_DRIFT},
+        "beta": frozenset(ERRORS) - _errors_of("psi_rad") | {ALPHA_BIAS, ALPHA_DRIFT},
     },
 )
 """The kinematics of the lateral-directional motion (`telling`: judgement, as in the longitudinal motion)."""
