@@ -1,8 +1,9 @@
 """ATTAS: the sideslip is declared at the CG and was measured 13.08 m ahead of it, the accelerometer is 1.01 m behind (R. V.
-Jategaonkar, *Flight Vehicle System Identification*, 2006, companion code), which kinematics alone must show.
+Jategaonkar, *Flight Vehicle System Identification*, 2006, companion code), which kinematics alone must show, and a trace.
 """
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +12,16 @@ from airtruth.checks.gate import inspect
 from airtruth.checks.kinematics_lateral import check_lateral
 from airtruth.importers.sources import open_source
 from airtruth.logs.flight_log import FlightLog
+from airtruth.tracing import TraceOptions, trace
 from airtruth.units import DEG, FT
 
 pytestmark = pytest.mark.slow
 
+HERE = Path(__file__).resolve().parent
+CNR = -0.159
+"""Published Cnr with the sideslip moved to the CG (N_r = -0.294, L_r = 0.660 1/s) [-]."""
+SPLIT_S = 20.0
+"""Time at which each record is divided in a part that is fitted and one that is held out [s]."""
 SPAN_M = 21.5
 ARM_M, ACCELEROMETER_M = 13.08, -1.010
 PLAIN = {"ax_m_s2": 2, "ay_m_s2": 3, "az_m_s2": 4, "airspeed_m_s": 15, "density_kg_m3": 34}
@@ -27,15 +34,28 @@ DEGREES = {
 @pytest.fixture(scope="module")
 def log(measured):
     """The aileron record and the rudder record, with the gap between them."""
+    return record(measured, (0.0,))
+
+
+@pytest.fixture(scope="module")
+def parts(measured):
+    """The same records, each in two parts."""
+    return record(measured, (0.0, SPLIT_S))
+
+
+def record(measured, starts_s):
+    """The record in runs that start at these times of each manoeuvre [s]."""
     data = next(iter(open_source(measured("fAttasAilRud1.mat")).arrays.values()))
     channels = {n: data[:, k - 1] for n, k in PLAIN.items()}
     channels |= {n: DEG * data[:, k - 1] for n, k in DEGREES.items()}
     channels["aileron_rad"] = 0.5 * DEG * (data[:, 28] - data[:, 27])
     channels["altitude_m"] = FT * data[:, 15]
     t = data[:, 0]
-    ends = [0, *(np.flatnonzero(np.diff(t) > 0.1) + 1), len(t)]
+    first = [0, *(np.flatnonzero(np.diff(t) > 0.1) + 1)]
+    ends = [*(a + round(s / 0.04) for a in first for s in starts_s), len(t)]
     times = np.concatenate([t[a:b] - t[a] for a, b in itertools.pairwise(ends)])
-    return FlightLog({}, ("aileron", "rudder"), np.array(ends), np.round(times, 6), channels)
+    names = tuple(f"{n}-{k}" for n in ("aileron", "rudder") for k in range(len(starts_s)))
+    return FlightLog({}, names, np.array(ends), np.round(times, 6), channels)
 
 
 def test_the_gate_accepts_the_records(log):
@@ -61,3 +81,19 @@ def test_without_it_the_arm_is_that_from_the_accelerometer(log):
     assert arm.lower < ARM_M - ACCELEROMETER_M < arm.upper
     assert arm.upper - arm.lower < 2.0
     assert "enter as their difference" in " ".join(result.sentences)
+
+
+@pytest.mark.study
+def test_a_trace_names_the_arm(parts):
+    """Each interval holds 13.08 m; Cnr, which had absorbed the arm, moves to the published one without it."""
+    options = TraceOptions(motion="lateral", hold_out=("aileron-1", "rudder-1"), increments=False)
+    answer = trace([parts], HERE / "attas", options).to_dict()
+    print(answer["effects"], answer["derivatives"], answer["error"])
+    (arm,) = (e for e in answer["effects"] if (e["name"], e["channel"]) == ("vane_arm", "beta_rad"))
+    low, high = arm["parameters"]["x_m"]["ci95"]
+    assert low < ARM_M < high
+    derivatives = answer["derivatives"]
+    assert abs(derivatives["after"]["Cnr"] - CNR) < abs(derivatives["declared"]["Cnr"] - CNR)
+    before, after = (answer["error"][stage]["held_out"]["free_run"] for stage in ("before", "after"))
+    assert after["beta_rad"] < before["beta_rad"]
+    assert after["r_rad_s"] < before["r_rad_s"]

@@ -151,7 +151,7 @@ def compare(
             "yawed", of_r + of_phi, lambda: integral(heading_rate(record.q, r, bank, record.theta), dt)
         )
         result["psi"] = record.psi - earlier(yawed, dt, -of("psi_rad", "delay")[0])
-    if "beta" in equations and record.beta is not None:
+    if "beta" in equations and (beta := record.beta) is not None:
         of_air = tuple(float(errors.get(name, 0.0)) for name in (ALPHA_BIAS, ALPHA_DRIFT))
         of_ay = of("ay_m_s2", "delay", "scale", "arm", "arm_down")
         turned = record.kept(
@@ -159,6 +159,7 @@ def compare(
             of_p + of_r + of_phi + of_air + of_ay,
             lambda: _turned(
                 record,
+                beta,
                 p,
                 r,
                 record.kept("fall", of_phi, lambda: side_gravity(record.theta, bank)),
@@ -168,18 +169,24 @@ def compare(
         )
         scale, arm, lag, delay = of("beta_rad", "scale", "arm", "lag", "delay")
         vane = lagged(earlier(turned + arm * r / record.airspeed, dt, -delay), dt, lag)
-        result["beta"] = record.beta - scale * vane
+        result["beta"] = beta - scale * vane
     return result
 
 
 def _turned(
-    record: SideRecord, p: Array, r: Array, fall: Array, of_air: tuple[float, ...], of_ay: tuple[float, ...]
+    record: SideRecord,
+    beta: Array,
+    p: Array,
+    r: Array,
+    fall: Array,
+    of_air: tuple[float, ...],
+    of_ay: tuple[float, ...],
 ) -> Array:
     """Sideslip that rates and specific force make, up to a constant [rad], of the shape of the channels.
 
     Parameters
     ----------
-    p, r : true rates [rad/s]; fall : gravity along body y [m/s2].
+    beta : measured sideslip [rad]; p, r : true rates [rad/s]; fall : gravity along body y [m/s2].
     of_air : constant [rad] and ramp [rad/s] of alpha.
     of_ay : delay [s], scale [-], and arms [m] of the accelerometer.
     """
@@ -187,7 +194,7 @@ def _turned(
 
     def air() -> tuple[Array, Array, Array]:
         ramp = record.t - record.t.mean()
-        alpha, sine = record.alpha - of_air[0] - of_air[1] * ramp, np.sin(record.beta)
+        alpha, sine = record.alpha - of_air[0] - of_air[1] * ramp, np.sin(beta)
         forward = record.path + G0 * np.sin(alpha - record.theta)
         return alpha, forward * sine, np.sqrt(1.0 - sine**2)
 
@@ -253,8 +260,7 @@ LATERAL: Final = Kinematics(
     moved_by={
         "phi": _errors_of("p_rad_s", "r_rad_s", "phi_rad"),
         "psi": _errors_of("r_rad_s", "phi_rad", "psi_rad"),
-        "beta": _errors_of("p_rad_s", "r_rad_s", "phi_rad", "beta_rad", "ay_m_s2")
-        | {ALPHA_BIAS, ALPHA_DRIFT},
+        "beta": frozenset(ERRORS) - _errors_of("psi_rad") | {ALPHA_BIAS, ALPHA_DRIFT},
     },
 )
 """The kinematics of the lateral-directional motion (`telling`: judgement, as in the longitudinal motion)."""

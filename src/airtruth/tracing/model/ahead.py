@@ -81,38 +81,24 @@ class _Kind(NamedTuple):
 
 
 def _pitch() -> _Kind:
-    increments, states = np.zeros(len(LONGITUDINAL.derivatives)), np.zeros(core_states(LONGITUDINAL))
-    return _Kind(
-        LONGITUDINAL,
-        AircraftArrays._make(
-            [*[1.0] * 12, np.zeros((2, 3)), increments, _AXIS, _AXIS, _AXIS, np.zeros((2, 2, 2, 3))]
-        ),
-        AirPoint,
-        GridSignals,
-        AircraftMoves(1.0, np.zeros(3), np.zeros((2, 3)), 0.0, states, states),
-    )
+    motion, forces = LONGITUDINAL, len(LONGITUDINAL.coefficients) + 1
+    increments, states = np.zeros(len(motion.derivatives)), np.zeros(core_states(motion))
+    table = np.zeros((2, 2, 2, forces))
+    aircraft = AircraftArrays._make([*[1.0] * 12, table[0, 0], increments, _AXIS, _AXIS, _AXIS, table])
+    moves = AircraftMoves(1.0, np.zeros(forces), table[0, 0], 0.0, states, states)
+    return _Kind(motion, aircraft, AirPoint, GridSignals, moves)
 
 
 def _side() -> _Kind:
-    increments, states = np.zeros(len(LATERAL.derivatives)), np.zeros(core_states(LATERAL))
-    signals, controls = len(LATERAL.signals), len(LATERAL.controls)
-    aircraft = LateralAircraft(
-        *[1.0] * 8,
-        trim=np.zeros(signals),
-        neutral_rad=np.zeros(controls),
-        effectiveness=np.ones(controls),
-        cg_shift=0.0,
-        cg_y_m=0.0,
-        yaw_moment_n_m=0.0,
-        constant=np.zeros((2, 3)),
-        increments=increments,
-        alpha_rad=_AXIS,
-        points=np.tile(_AXIS, (signals, 1)),
-        values=np.zeros((signals, 2, 2, 3)),
-    )
-    return _Kind(
-        LATERAL, aircraft, LateralPoint, LateralGrid, LateralMoves(1.0, increments, 0.0, states, states)
-    )
+    motion, forces = LATERAL, len(LATERAL.coefficients)
+    increments, states = np.zeros(len(motion.derivatives)), np.zeros(core_states(motion))
+    signals, controls = np.zeros(len(motion.signals)), np.zeros(len(motion.controls))
+    table = np.zeros((signals.size, 2, 2, forces))
+    points = np.tile(_AXIS, (signals.size, 1))
+    about = [signals, controls, controls, 0.0, 0.0, 0.0, table[0, 0], increments]
+    aircraft = LateralAircraft._make([*[1.0] * 8, *about, _AXIS, points, table])
+    moves = LateralMoves(1.0, increments, 0.0, states, states)
+    return _Kind(motion, aircraft, LateralPoint, LateralGrid, moves)
 
 
 def _linearise(kind: _Kind) -> None:

@@ -106,21 +106,21 @@ def slopes_along(
     corners = _corners(nodes, moves)
     scale = np.tril(np.linalg.inv(corners.white[:, common, None]) @ corners.white)
     scale[:, common] = np.eye(count)
-    own = _Gains(corners.k_gain, corners.first, corners.direct, scale)
+    every = _Gains(corners.k_gain, corners.first, corners.direct, scale)
     made: list[_Gains] = []
     for row in range(rows):
         if row > 0 and moves.h[row] == 0.0:
             made.append(made[0])
             more[row] = more[0]
             continue
-        gains = _each(lambda x, row=row: _along(x[row], samples, lower, share), own)
+        gains = _each(lambda x, row=row: _along(x[row], samples, lower, share), every)
         more[row] = _recursion(gains, corners.row(row), scale[row], node, corner_rad2, uncertain, row == 0)
         if row == 0:
             places = np.flatnonzero(uncertain)
         made.append(_each(lambda x, at=places: x[at], gains))
     h = np.where(moves.h[1:] == 0.0, 1.0, moves.h[1:])
     # where the surface is certain, the gains are the settled ones
-    slopes = _each(lambda x: _along(x, samples, lower, share), _divided(own, moves))
+    slopes = _each(lambda x: _along(x, samples, lower, share), _divided(every, moves))
     _each(partial(_put, places), slopes, _divided(_each(lambda *x: np.stack(x), *made), moves))
     return slopes, (more[1:] - more[0]) / h
 
