@@ -38,8 +38,19 @@ RECORDS: Final = 6
 GUST_M_S, GUST_LENGTH_M = 0.15, 50.0
 SETTLED_S: Final = 0.1
 """From the last command of the autopilot to the start of a record [s]: longer than the delay, so that the air sees none of it."""
-LOW_PASS: Final = firwin(41, 20.0, fs=100.0)
-"""Filter of a recorder at 50 Hz for channels at 100 Hz: half the amplitude at 20 Hz."""
+LOW_PASS: Final = firwin(161, 20.0, fs=1.0 / STEP_S)
+"""Filter of a recorder at 50 Hz, before it samples: half the amplitude at 20 Hz."""
+INSTRUMENTS: Final = {
+    "imu": (
+        100.0,
+        {"q": ("q_rad_s", 0.15 * DEG), "ax": ("ax_m_s2", 0.015 * G0), "az": ("az_m_s2", 0.015 * G0)},
+    ),
+    "attitude": (50.0, {"theta": ("theta_rad", 0.1 * DEG)}),
+    "airspeed": (50.0, {"airspeed": ("airspeed_m_s", 0.2)}),
+    "baro": (50.0, {"altitude": ("altitude_m", 0.15)}),
+    "servo": (100.0, {"command": ("command_rad", 0.0)}),
+}
+"""Topic -> rate [Hz], and of each channel the signal of the flight and the standard deviation of its noise at this rate [SI]."""
 FULL_DEG: Final = 25.0
 """Surface at full servo travel, 400 us from the centre [deg]."""
 
@@ -100,26 +111,17 @@ def topics(flight: Flight, seed: int = 2) -> dict[str, tuple[Array, dict[str, Ar
     """Topic -> times [s] and noisy series [SI], each topic at its own rate."""
     rng = np.random.default_rng(seed)
 
-    def at(rate_hz: float, **channels: tuple[Array, float]) -> tuple[Array, dict[str, Array]]:
+    made = {}
+    for topic, (rate_hz, channels) in INSTRUMENTS.items():
         t = np.arange(flight.t_s[0] + 0.001, flight.t_s[-1], 1.0 / rate_hz)
-        made = {
-            name: np.interp(t, flight.t_s, x) + std * rng.standard_normal(t.size)
-            for name, (x, std) in channels.items()
-        }
-        return t, made
-
-    return {
-        "imu": at(
-            100.0,
-            q=(flight.q_rad_s, 0.15 * DEG),
-            ax=(flight.ax_m_s2, 0.015 * G0),
-            az=(flight.az_m_s2, 0.015 * G0),
-        ),
-        "attitude": at(50.0, theta=(flight.theta_rad, 0.1 * DEG)),
-        "airspeed": at(50.0, airspeed=(flight.airspeed_m_s, 0.2)),
-        "baro": at(50.0, altitude=(flight.altitude_m, 0.15)),
-        "servo": at(100.0, command=(flight.command_rad, 0.0)),
-    }
+        made[topic] = (
+            t,
+            {
+                name: np.interp(t, flight.t_s, getattr(flight, signal)) + std * rng.standard_normal(t.size)
+                for name, (signal, std) in channels.items()
+            },
+        )
+    return made
 
 
 def write_px4(path: Path, flight: Flight) -> None:
@@ -208,9 +210,8 @@ def write_ardupilot(path: Path, flight: Flight) -> None:
 
 def write_csv(path: Path, flight: Flight) -> None:
     """A CSV of a test centre at 50 Hz, its records one below another: foreign names, degrees, knots, feet and g."""
-    made = topics(flight)
     t = np.arange(0.1, flight.t_s[-1] - 0.1, 0.02)
-    series = {name: _recorded(t, at, x) for at, group in made.values() for name, x in group.items()}
+    series = _recorded(flight, t)
     runs = np.full(t.size, -1)
     for k, (start, end) in enumerate(command_windows()[:RECORDS]):
         runs[(t > start + SETTLED_S) & (t < end - SETTLED_S)] = k + 1
@@ -231,11 +232,17 @@ def write_csv(path: Path, flight: Flight) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _recorded(t_s: Array, at_s: Array, x: Array) -> Array:
-    """Samples of a recorder at 50 Hz, which takes the band above 25 Hz out of faster channels, without lag."""
-    if at_s[1] - at_s[0] < t_s[1] - t_s[0] - 1e-9:
-        x = np.convolve(np.pad(x, LOW_PASS.size // 2, mode="edge"), LOW_PASS, mode="valid")
-    return np.asarray(np.interp(t_s, at_s, x))
+def _recorded(flight: Flight, t_s: Array, seed: int = 2) -> dict[str, Array]:
+    """Samples of a recorder that takes the upper band out of each signal and its noise, without lag, before it samples."""
+    rng = np.random.default_rng(seed)
+    made = {}
+    for rate_hz, channels in INSTRUMENTS.values():
+        for name, (signal, std) in channels.items():
+            own = getattr(flight, signal)
+            noisy = own + std / np.sqrt(rate_hz * STEP_S) * rng.standard_normal(own.size)
+            filtered = np.convolve(np.pad(noisy, LOW_PASS.size // 2, mode="edge"), LOW_PASS, mode="valid")
+            made[name] = np.interp(t_s, flight.t_s, filtered)
+    return made
 
 
 def _message(kind: bytes, body: bytes) -> bytes:

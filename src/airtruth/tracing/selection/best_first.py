@@ -117,8 +117,9 @@ class _BestFirst:
         if as_declared is not None:
             self._expansions.append(expanded(self.sets.problem, as_declared, self.effects))
         self._tempered(null)
+        self._predict(null)
         measured: list[PosteriorFit] = [null]
-        seen: list[PosteriorFit] = []
+        seen: list[PosteriorFit] = [null]
         swept, limit = False, REFITS
         while True:
             best = self._best()
