@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from airtruth.tracing import accepted, answer, stage_errors
+from airtruth.tracing.criterion import CRITERION, AnswerCriterion
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 """Root of the repository."""
@@ -90,7 +91,16 @@ def keys() -> str:
 
 def rules() -> str:
     """Tables of the numbers that decide, a heading for each module."""
-    parts = []
+    own = [
+        f"| `{name}` | {getattr(CRITERION, name)} | {_cell(meaning)} |"
+        for name, meaning in attributes(AnswerCriterion)
+    ]
+    head = "`airtruth.tracing.criterion.AnswerCriterion`: the constants that decide what a trace answers; its provenance states them"
+    parts = [
+        "\n".join(
+            ["## criterion", "", f"{head}.", "", "| constant | value | meaning |", "|---|---|---|", *own]
+        )
+    ]
     paths = [path for pattern in DECIDING for path in sorted((ROOT / "src" / "airtruth").glob(pattern))]
     for path in paths:
         rows = [f"| `{name}` | {value} | {_cell(text)} |" for name, value, text in _numbers(path)]

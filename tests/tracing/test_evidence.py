@@ -14,11 +14,12 @@ from scipy.stats import multivariate_normal
 
 from airtruth.effects.effect import Prior
 from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.causes import DERIVATIVES, Cause, DeclaredCauses
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.selection.best_first import best_first
 from airtruth.tracing.selection.columns import EffectColumn
-from airtruth.tracing.selection.evidence import LOG_WRONG, WRONG_BY, Quadratic
+from airtruth.tracing.selection.evidence import Quadratic
 from airtruth.tracing.selection.expansion import expanded
 from airtruth.tracing.selection.set_table import SetTable
 
@@ -59,19 +60,19 @@ def test_the_evidence_of_normal_sizes_is_the_density_of_the_records():
 def test_a_wrong_declaration_is_a_wider_prior():
     q, y, a = linear()
     found = [w for w in q.sets(1) if w.declaration.wrong == (1,) and not w.columns]
-    assert len(found) == len(WRONG_BY)
-    odds = np.exp(LOG_WRONG)
+    assert len(found) == len(CRITERION.wrong_by)
+    odds = np.exp(CRITERION.log_wrong)
     every = 2.0 * odds + odds**2  # either of two derivatives, or both
-    for w, by in zip(found, WRONG_BY, strict=True):
+    for w, by in zip(found, CRITERION.wrong_by, strict=True):
         exact = log_density(y, a[:, :2], np.diag([0.3, 0.5 * by]) ** 2)
-        assert w.log_evidence == pytest.approx(exact + LOG_WRONG - np.log(2.0 * every), abs=1e-8)
+        assert w.log_evidence == pytest.approx(exact + CRITERION.log_wrong - np.log(2.0 * every), abs=1e-8)
         assert q.names(w) == (DERIVATIVES,)
 
 
 def test_wrong_declarations_together_are_as_probable_as_none():
     q, _, _ = linear()
     alone = [w.declaration for w in q.sets(1) if w.declaration.wrong and not w.columns]
-    assert len(alone) == 3 * len(WRONG_BY)
+    assert len(alone) == 3 * len(CRITERION.wrong_by)
     assert sum(np.exp(d.log_odds) for d in alone) == pytest.approx(1.0, abs=1e-12)
 
 

@@ -7,9 +7,10 @@ import pytest
 import trace_records as tr
 from scipy.stats import chi2
 
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.homogeneity import DIFFERENCES, Homogeneity, homogeneity, spread
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.record_differences import LEVEL, differences
+from airtruth.tracing.record_differences import differences
 
 NAMES = ["r0", "r1", "r2", "r3"]
 AMPLITUDES = (0.035, -0.035, 0.03, -0.03)
@@ -52,7 +53,7 @@ def test_alike_records_agree_as_often_as_chance_says():
     assert degrees == 6 * 3
     mean = np.mean([h.statistic for h in found])
     assert mean == pytest.approx(degrees, abs=3.0 * np.sqrt(2.0 * degrees / len(found)) + 2.0)
-    assert min(h.p_value for h in found) > LEVEL
+    assert min(h.p_value for h in found) > CRITERION.differ
 
 
 def test_the_record_whose_vane_reads_too_much_is_the_odd_one():

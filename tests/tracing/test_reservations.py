@@ -7,11 +7,11 @@ from scipy.stats import norm
 
 from airtruth.quantity import Ratio
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
-from airtruth.tracing.anomalies.significance import LEVEL
 from airtruth.tracing.answer import Alternative, DeclaredModel, DerivativeShift
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.declared_model import traceable_errors
 from airtruth.tracing.notes import within_assumed_uncertainty, worse_held_out
-from airtruth.tracing.reservations import MANY, causes, reservations
+from airtruth.tracing.reservations import causes, reservations
 from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
 
@@ -41,7 +41,7 @@ def test_one_or_two_causes_or_increments_alone_are_not_reserved(names):
 def test_three_causes_are_provisional():
     names = ("accelerometer_scale", "gyro_bias", "inertia_error")
     (reason,) = reservations(effects(*names), ())
-    assert causes(effects(*names)) == MANY
+    assert causes(effects(*names)) == CRITERION.many
     assert reason.startswith("accelerometer_scale, gyro_bias, inertia_error are 3 causes or more")
 
 
@@ -170,9 +170,9 @@ def test_of_several_names_each_needs_stronger_evidence():
 
 def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
     for name in ("vane_lag", "vane_scale"):
-        (reason,) = reservations(effects(name), (), friction_p_value=LEVEL)
+        (reason,) = reservations(effects(name), (), friction_p_value=CRITERION.level)
         assert f"beside {name}" in reason
-        assert reservations(effects(name), (), friction_p_value=1.01 * LEVEL) == ()
+        assert reservations(effects(name), (), friction_p_value=1.01 * CRITERION.level) == ()
     assert reservations(effects("gyro_lag", "cg_shift"), (), friction_p_value=1e-9) == ()
 
 
@@ -182,7 +182,7 @@ def test_a_vane_that_is_no_later_than_a_friction_makes_it_in_gusts_is_provisiona
     assert "looks like a lag of 5 ms, and vane_lag is not larger" in reason
     assert reservations([late], (), friction_lag_s=0.0049) == ()
     assert reservations(effects("gyro_lag", "vane_scale"), (), friction_lag_s=1.0) == ()
-    assert len(reservations([late], (), friction_p_value=LEVEL, friction_lag_s=0.0051)) == 1
+    assert len(reservations([late], (), friction_p_value=CRITERION.level, friction_lag_s=0.0051)) == 1
 
 
 def shift(declared, declared_std, estimate, std):

@@ -16,7 +16,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing import TraceAnswer, TraceOptions, trace
-from airtruth.tracing.answer import ANOMALY_LEVEL
+from airtruth.tracing.criterion import CRITERION
 
 CASES = {
     "null": (),
@@ -128,7 +128,7 @@ def test_nothing_is_traced_where_nothing_is_missing(traced):
     a = traced["null"]
     assert (a["verdict"], a["provisional"], a["effects"]) == ("none", False, [])
     assert (a["updated_aircraft"] is None) == (not a["refined"])
-    assert a["anomaly"]["p_value"] > ANOMALY_LEVEL
+    assert a["anomaly"]["p_value"] > CRITERION.significant
     assert a["anomaly"] == a["remaining"]
     assert a["derivatives"]["before"] == a["derivatives"]["after"]
 

@@ -7,7 +7,7 @@ from dataclasses import fields
 import pytest
 
 from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.reservations import MANY
+from airtruth.tracing.criterion import CRITERION
 from scripts.trace_tables import CLASSES, KEYS_PAGE, PAGES, attributes, keys, rules, with_part
 
 
@@ -26,7 +26,7 @@ def test_every_key_is_described(documented) -> None:
 def test_keys_and_rules_have_their_rows() -> None:
     assert all(f"`{f.name}`" in keys() for f in fields(TraceAnswer))
     assert "`shown_by`" in KEYS_PAGE.read_text(encoding="utf-8")
-    assert f"| `MANY` | {MANY} | Number of separate causes" in rules()
+    assert f"| `many` | {CRITERION.many} | number of separate causes" in rules()
 
 
 def test_a_class_without_attributes_is_refused() -> None:

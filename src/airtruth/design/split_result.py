@@ -16,8 +16,8 @@ from airtruth.design.separation import Member
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.selection.explanation import AS_GOOD
 from airtruth.units import DEG
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _LABELS: Final = ("alpha [deg]", "q [deg/s]", "az [m/s2]")
 """Names of the outputs in a figure."""
 _SCALES: Final = (1.0 / DEG, 1.0 / DEG, 1.0)
 """Factors from SI to the units of `_LABELS`."""
-_TIE: Final = -2.0 * math.log(AS_GOOD)
+_TIE: Final = -2.0 * math.log(CRITERION.level)
 """Difference in 2 log L up to which two hypotheses explain the records equally well [-]."""
 
 

@@ -16,12 +16,6 @@ from airtruth.tracing.stage_errors import COUNTS, AxialErrors, Errors, Replay, T
 
 ANSWER: Final = "trace.json"
 """Name of the file in the folder of a trace."""
-ANOMALY_LEVEL: Final = 0.01
-"""Probability below which an anomaly that accepted effects leave makes the answer provisional [-] (judgement: one right answer
-in a hundred)."""
-DECLARED_LEVEL: Final = 0.005
-"""Probability below which the declared model is contradicted [-] (judgement: at most one true declaration in a hundred may be;
-at a level of 0.01 it was 6 of 450)."""
 Z95: Final = 1.959964
 """Quantile 0.975 of the standard normal distribution, the half width of the intervals [standard deviations]."""
 
@@ -367,9 +361,7 @@ def _is_row(value: Any) -> TypeGuard[Any]:
 
 
 __all__ = [
-    "ANOMALY_LEVEL",
     "ANSWER",
-    "DECLARED_LEVEL",
     "Z95",
     "AcceptedEffect",
     "Alternative",

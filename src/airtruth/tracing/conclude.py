@@ -14,9 +14,7 @@ from airtruth.effects.increment import Increment
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.tracing.anomalies.families import FRICTION
 from airtruth.tracing.anomalies.score_test import ScoreTable
-from airtruth.tracing.anomalies.significance import CONTRADICTED, LEVEL
 from airtruth.tracing.answer import (
-    ANOMALY_LEVEL,
     AcceptedEffect,
     Alternative,
     CandidateScore,
@@ -31,6 +29,7 @@ from airtruth.tracing.answer import (
 from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.confirmation import confirmation
 from airtruth.tracing.credit import credit
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.declared_model import (
     alike,
     alternatives,
@@ -57,7 +56,7 @@ from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_
 from airtruth.tracing.next_flight import next_flight
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.record_differences import CERTAIN, differences
+from airtruth.tracing.record_differences import differences
 from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.candidate import Candidate
@@ -123,7 +122,7 @@ def conclude(
         or bool(case.left_out)
         or bool(shown and reserved)
         or bool(worsened(replay))
-        or (bool(shown) and remaining.p_value <= ANOMALY_LEVEL),
+        or (bool(shown) and remaining.p_value <= CRITERION.significant),
         anomaly=_evidence(anomaly),
         remaining=_evidence(remaining),
         effects=shown,
@@ -196,7 +195,7 @@ def _verdict(
     effects: Sequence[AcceptedEffect], declared: DeclaredModel, agreement: Homogeneity
 ) -> VerdictName:
     if not effects:
-        return "none" if declared.consistent and agreement.p_value >= CERTAIN else "unexplained"
+        return "none" if declared.consistent and agreement.p_value >= CRITERION.certain else "unexplained"
     if any(e.acts_on is not None for e in effects):
         return "learned"
     return "one_of" if any(e.indistinguishable_from for e in effects) else "traced"
@@ -269,7 +268,7 @@ def _candidates(
             why = ""
         elif any(s.effect.key in step.removeprefix("refit ").split(" + ") for step in case.left_out):
             why = "the time budget ended before its refit"
-        elif p > LEVEL:
+        elif p > CRITERION.level:
             why = "its score is not significant"
         else:
             weight = sum(w for names, w in posterior.items() if s.effect.label in names)
@@ -321,10 +320,10 @@ def _detectability(
     sizes: Mapping[str, tuple[float, float]],
 ) -> dict[str, float]:
     """Smallest traceable sizes at a null that is probable; none where no round has one."""
-    if rounds[0].declared_test.p_value > CONTRADICTED:
+    if rounds[0].declared_test.p_value > CRITERION.significant:
         test = rounds[0].declared_test
         return detectability(rounds[0].table) | detectable_causes(likelihood, sizes, case.declared, test)
-    return detectability(rounds[-1].table) if rounds[-1].anomaly.p_value > ANOMALY_LEVEL else {}
+    return detectability(rounds[-1].table) if rounds[-1].anomaly.p_value > CRITERION.significant else {}
 
 
 def detectability(table: ScoreTable) -> dict[str, float]:

@@ -13,9 +13,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2, norm
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.tracing.anomalies.significance import CONTRADICTED
 from airtruth.tracing.answer import (
-    DECLARED_LEVEL,
     Z95,
     AcceptedEffect,
     Alternative,
@@ -25,6 +23,7 @@ from airtruth.tracing.answer import (
     ParameterEstimate,
     RefinedDerivative,
 )
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.causes import (
     DERIVATIVES,
     DeclaredCauses,
@@ -39,7 +38,7 @@ from airtruth.tracing.inference.derivative_likelihood import (
 )
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.selection.explanation import AS_GOOD, ExplainedDerivatives, shares
+from airtruth.tracing.selection.explanation import ExplainedDerivatives, shares
 from airtruth.tracing.selection.rounds import SearchRound
 
 Array = NDArray[np.float64]
@@ -74,7 +73,7 @@ def declared_model(
     declared_std = np.sqrt(np.diag(problem.declared_covariance))
     shift, std = _apparent_shift(last, covariance, causes)
     return DeclaredModel(
-        consistent=p_value > DECLARED_LEVEL,
+        consistent=p_value > CRITERION.declared,
         statistic=statistic,
         degrees=test.degrees if by_derivatives else anomaly.degrees,
         p_value=p_value,
@@ -129,7 +128,7 @@ def with_axial_force(declared: DeclaredModel, along: Sequence[AcceptedEffect]) -
     gain = next(e.gain_2_log_likelihood or 0.0 for e in along if e.p_value == p_value)
     return replace(
         declared,
-        consistent=2.0 * p_value > DECLARED_LEVEL,
+        consistent=2.0 * p_value > CRITERION.declared,
         statistic=gain,
         degrees=1,
         p_value=2.0 * p_value,
@@ -196,7 +195,7 @@ def explaining_effects(rounds: Sequence[SearchRound], covariance: Array) -> tupl
 def alike(last: SearchRound, name: str) -> tuple[str, ...]:
     """Names that explain the records as well in the place of one name of the answer, by the posterior of the sets."""
     names = last.names
-    rest, least = set(names) - {name}, AS_GOOD * last.posterior.get(names, 0.0)
+    rest, least = set(names) - {name}, CRITERION.level * last.posterior.get(names, 0.0)
     others = (
         set(other) - rest
         for other, weight in last.posterior.items()
@@ -240,7 +239,7 @@ def cause_scores(
     """
     first = rounds[0]
     named = {name for e in accepted for name in (e.label, *e.indistinguishable_from)}
-    contradicted = first.declared_test.p_value <= CONTRADICTED
+    contradicted = first.declared_test.p_value <= CRITERION.significant
     rejected = (
         "other causes explain the derivatives better"
         if contradicted
@@ -295,7 +294,7 @@ def traceable_errors(directions: int, derivatives: int = 0) -> float:
     ----------
     derivatives : number of single derivatives that are tested, for a cause that is one of them; 0 for others.
     """
-    level = 0.25 * DECLARED_LEVEL
+    level = 0.25 * CRITERION.declared
     threshold = chi2.isf(level, directions)
     power = brentq(lambda noncentrality: ncx2.sf(threshold, directions, noncentrality) - _POWER, 1.0, 1e3)
     joint = math.sqrt(float(power))

@@ -23,7 +23,7 @@ from scipy.stats import chi2
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.anomalies.significance import significant_gain
-from airtruth.tracing.answer import DECLARED_LEVEL
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.searched import Searched
 
@@ -133,7 +133,7 @@ def _with_one_size(
         alone=dict(zip(names, (first, second), strict=True)),
         statistic=statistic,
         p_value=p_value,
-        refused=p_value < DECLARED_LEVEL,
+        refused=p_value < CRITERION.declared,
     )
     if not any(_names(s, key) for s in own):
         least = significant_gain(max(len(s.case.effects) for s in own))

@@ -27,6 +27,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import Evidence, TraceAnswer
+from airtruth.tracing.criterion import CRITERION
 
 ERRORS: Final = kinematics_model.ERRORS | kinematics_side.ERRORS
 """Errors that the kinematics of a motion can show, by name."""
@@ -36,11 +37,6 @@ quite white)."""
 _MOST_ERRORS: Final = 6.0
 """Standard errors at most by which the check's estimate differs from none where it is a prior [-] (judgement: more than this is
 certain, and less than the errors of a kinematic model that knows neither lags of the pneumatics nor bending)."""
-_FITS: Final = 0.05
-"""Probability of the check's absolute test from which it fits the records [-] (convention)."""
-_IMPOSSIBLE: Final = 1e-6
-"""Probability of the check's absolute test below which an answer without a cause is not that nothing is missing [-] (judgement:
-one of 140 null trials has 1.4e-7)."""
 _SAMPLES: Final = 0.5
 """Time over the sample period up to which the check does not contradict a trace [-] (judgement: between two samples it follows
 the motion by a polynomial, and a surface that steps bends it; ideal sensors logged at 20 Hz show a gyro late by a quarter of a
@@ -131,7 +127,7 @@ def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> t
     """
     if check is None:
         return tuple(effects)
-    fits = check.p_value >= _FITS and [c.errors for c in check.possible] == [()]
+    fits = check.p_value >= CRITERION.level and [c.errors for c in check.possible] == [()]
     shown = {
         f.name: f
         for f in check.findings
@@ -226,7 +222,7 @@ def with_contradictions(answer: TraceAnswer, check: CheckResult | None, dt_s: fl
     """
     found = disagreement(check, answer, dt_s)
     provisional = answer.provisional or bool(found and answer.effects)
-    if answer.verdict == "none" and check is not None and check.p_value < _IMPOSSIBLE:
+    if answer.verdict == "none" and check is not None and check.p_value < CRITERION.certain:
         left = Evidence(check.statistic, check.p_value, "the kinematics of the fitted records")
         found.append(
             f"the channels of the fitted records contradict each other (p = {check.p_value:.2g} of the kinematic check), and no "

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.tracing.anomalies.families import advice
-from airtruth.tracing.answer import ANOMALY_LEVEL, VerdictName
+from airtruth.tracing.answer import VerdictName
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.selection.candidate import Candidate
 
@@ -48,7 +49,7 @@ def next_flight(
             )
             lines.append(f"Separate {', '.join(names)} as follows. {split}{computed}")
     lines += learned
-    if remaining.p_value <= ANOMALY_LEVEL:
+    if remaining.p_value <= CRITERION.significant:
         lines.append(f"The remaining residual shows in {remaining.null}: {advice(remaining.null, motion)}")
     return " ".join(lines) or (
         "Repeat the manoeuvre with the largest residual, with opposite "

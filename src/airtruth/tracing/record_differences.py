@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.homogeneity import Homogeneity
 
-LEVEL: Final = 1e-4
-"""Probability of the agreement of the records below which names are provisional [-] (judgement: none of 80 nulls of the
-blind trials is below)."""
-CERTAIN: Final = 1e-6
-"""Probability of the agreement of the records below which the verdict "none" becomes "unexplained" [-] (judgement: beyond
-doubt)."""
 _AGREE: Final = 0.01
 """Probability of the agreement of the others from which a record is named [-] (convention)."""
 
@@ -25,7 +20,7 @@ def differences(test: Homogeneity, records: Sequence[str], names: bool) -> list[
     test : of the answer's effects; records : names of the fitted records, in its order.
     names : whether the answer has effects, which then are provisional.
     """
-    if test.p_value >= LEVEL:
+    if test.p_value >= CRITERION.differ:
         return []
     differ = (
         "the fitted records contradict each other in derivatives or sizes of effects "
@@ -45,4 +40,4 @@ def differences(test: Homogeneity, records: Sequence[str], names: bool) -> list[
     ]
 
 
-__all__ = ["CERTAIN", "LEVEL", "differences"]
+__all__ = ["differences"]

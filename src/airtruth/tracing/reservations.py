@@ -15,26 +15,13 @@ from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import VANES
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
-from airtruth.tracing.anomalies.significance import LEVEL
-from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
+from airtruth.tracing.answer import Alternative
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.friction import PLAUSIBLE_RAD, is_late_vane
 from airtruth.tracing.inference.causes import DERIVATIVES
 from airtruth.tracing.selection.explanation import events
 from airtruth.units import DEG
 
-MANY: Final = 3
-"""Number of separate causes from which their names are provisional [-] (judgement: in the blind trials an effect outside
-the library is answered by three or more names about as often as three true causes are)."""
-LEAST_INCLUSION: Final = 0.5
-"""Posterior probability of a named cause below which the names are provisional [-]: the sets without it are more probable."""
-WEAK: Final = 0.01
-"""P-value of a name over all candidates from which it is provisional [-]: that of an unexplained verdict. Of the answers without
-a reservation in the trials of leave-one-out, slow, triple and unmodelled, two names exceeded it, and both were wrong."""
-WEAK_OF_SEVERAL: Final = 2e-5
-"""The same of each of several names [-]: a gain of 25 in 2 log L, because one effect that the library lacks can look like several
-of unequal evidence (judgement)."""
-UNUSUAL: Final = 3.0
-"""Size of a named cause over the standard deviation of its prior from which the names are provisional [-] (convention)."""
 _AXIAL: Final = "CX"
 """Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
 
@@ -49,7 +36,7 @@ def reservations(
     """Each reason against relying on the names of an answer, in words.
 
     The level of significance of the declared model where an increment has no name, of the posterior weight of increments without
-    any name, and of the friction of the vane is `LEVEL`.
+    any name, and of the friction of the vane is `AnswerCriterion.level`.
 
     Parameters
     ----------
@@ -61,10 +48,10 @@ def reservations(
     """
     named = [e for e in effects if e.acts_on is None]
     found = list(_unnamed(effects, named))
-    if causes(named) >= MANY:
+    if causes(named) >= CRITERION.many:
         found.append(
-            f"{_keys(named)} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names "
-            "are provisional until a flight of their own confirms each"
+            f"{_keys(named)} are {CRITERION.many} causes or more, and one effect that the library lacks can look like as many: "
+            "the names are provisional until a flight of their own confirms each"
         )
     reasons = [*_weak(effects, named, declared_p_value), *_improbable(effects, named, sets)]
     if reasons:
@@ -72,7 +59,7 @@ def reservations(
         found.append(
             f"the evidence {subject} is weak: {'; '.join(reasons)}. It is provisional until another flight shows it again"
         )
-    large = [e for e in named if _deviation(e) > UNUSUAL]
+    large = [e for e in named if _deviation(e) > CRITERION.far]
     if large:
         found.append(
             f"{_keys(large)} of such a size {'are' if len(large) > 1 else 'is'} improbable a priori, and a cause "
@@ -105,9 +92,11 @@ def _weak(
     effects: Sequence[AcceptedEffect], named: Sequence[AcceptedEffect], declared_p_value: float
 ) -> Iterator[str]:
     """Why the evidence of tests and intervals is weak."""
-    if any(e.acts_on != _AXIAL for e in effects) and declared_p_value > (DECLARED_LEVEL if named else LEVEL):
+    if any(e.acts_on != _AXIAL for e in effects) and declared_p_value > (
+        CRITERION.declared if named else CRITERION.level
+    ):
         yield f"p = {declared_p_value:.2g} for the declared model"
-    level = WEAK if len(named) < 2 else WEAK_OF_SEVERAL
+    level = CRITERION.significant if len(named) < 2 else CRITERION.significant_of_several
     weak = [e for e in named if e.p_value > level]
     if weak:
         yield f"p is above {level:g} for {_keys(weak)} alone among all candidates"
@@ -123,11 +112,11 @@ def _improbable(
     effects: Sequence[AcceptedEffect], named: Sequence[AcceptedEffect], sets: Sequence[Alternative]
 ) -> Iterator[str]:
     """Why the posterior of the names is low."""
-    doubtful = [e for e in named if _probability(e, sets) < LEAST_INCLUSION]
+    doubtful = [e for e in named if _probability(e, sets) < CRITERION.even]
     if sets and doubtful:
         yield f"the sets of causes without {_keys(doubtful)} are together more probable than those with"
     unnamed = sum(s.weight for s in sets if s.effects == (NAME,))
-    if named and len(named) == len(effects) and unnamed > LEVEL:
+    if named and len(named) == len(effects) and unnamed > CRITERION.level:
         yield f"learned increments explain the records without any name, with a posterior weight of {100.0 * unnamed:.0f} %"
 
 
@@ -139,7 +128,7 @@ def _friction(named: Sequence[AcceptedEffect], p_value: float, lag_s: float) -> 
         if e.key in EFFECTS and set(EFFECTS[e.key].channels) <= VANES and EFFECTS[e.key].channels
     ]
     late = [e for e in named if is_late_vane(e.key) and 0.0 < _value(e) <= lag_s]
-    if of_vane and p_value <= LEVEL:
+    if of_vane and p_value <= CRITERION.level:
         yield (
             f"the vane moves less than gyro and accelerometer show where the motion turns (p = {p_value:.2g} beside "
             f"{_keys(of_vane)}), and in gusts a friction of the vane looks like a lag: the name is provisional until the "
@@ -199,4 +188,4 @@ def causes(named: Sequence[AcceptedEffect]) -> int:
     return events([e.key for e in named])
 
 
-__all__ = ["LEAST_INCLUSION", "MANY", "UNUSUAL", "WEAK", "WEAK_OF_SEVERAL", "causes", "reservations"]
+__all__ = ["causes", "reservations"]

@@ -20,9 +20,10 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
+from airtruth.tracing.answer import ANSWER
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.conclude import conclude
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
     kinematic_check,
@@ -151,7 +152,7 @@ def answered(own: Begun, shared: Collection[str] = (), write: Write | None = Non
             return None, None
         advance("write the updated aircraft")
         atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
-        refit = refined or declared_p_value(rounds) <= DECLARED_LEVEL
+        refit = refined or declared_p_value(rounds) <= CRITERION.declared
         revision = revision_of(case, rounds, own.declared, refit, axial, shared)
         updated = write_update([revision], own.declared, out) if write is None else write(revision)
         return updated, flown_again(stages, own.declared, updated)
@@ -180,6 +181,7 @@ def provenance_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Prov
     if options.motion is None:
         del stated["motion"]
     words = {name: "default" if value is None else _words(value) for name, value in stated.items()}
+    words["criterion"] = str(CRITERION)
     digests = digests_of(logs, aircraft.folder)
     return Provenance(__version__, aircraft.name, words, digests, str(aircraft.folder.resolve()))
 

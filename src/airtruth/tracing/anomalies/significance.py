@@ -13,14 +13,6 @@ from scipy.stats import chi2
 from airtruth.tracing.anomalies.score_test import ScoreTable
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 
-LEVEL: Final = 0.05
-"""Significance level of the scores in the first round, after Holm's correction [-] (convention)."""
-REMAINS: Final = 0.01
-"""Probability of the remaining anomaly below which effects without a score are refitted and increments learned [-]; that of an
-unexplained verdict."""
-CONTRADICTED: Final = 0.01
-"""Probability below which records contradict the declared derivatives [-] (convention: one true declaration in a
-hundred is contradicted)."""
 FAMILY_LEVEL: Final = 0.05165827451
 """Significance level of the gain in 2 log L of a refit over all candidates, by Bonferroni's rule [-]: a gain of 10.0
 where 33 candidates are tested, 10.1 for the 35 of the library (judgement: a round figure next to 5 %)."""

@@ -11,7 +11,7 @@ from scipy.special import expit
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import NAME, Increment, Shape
-from airtruth.tracing.anomalies.significance import CONTRADICTED, REMAINS
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.learning.increment_fit import (
@@ -48,12 +48,6 @@ _HALF: Final = 0.5
 _PROMISING: Final = 0.2
 """Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted instead [-]
 (judgement: refits have tripled it)."""
-_EVIDENT: Final = 5.0
-"""Log evidence of a shape without a refit from which it is refitted where no anomaly remains [-] (judgement: refits of
-true shapes have tripled it, and a refit of a wrong one costs a few seconds)."""
-_NAMES_LEAD: Final = 5.0
-"""Log evidence by which increments alone have to lead for named effects to be given up [-] (judgement: a name is
-preferred to a curve)."""
 _AS_GOOD: Final = -1.0
 """Log evidence over that of names from which increments alone are a rival also where they act as the names do [-] (judgement:
 true names lead by 3.7 to 26 in the 13 trials of 28 where such increments were learned)."""
@@ -84,12 +78,12 @@ def with_increments(
     grown, evidence = learn.grown(rounds)
     last = rounds[-1]
     explained = last.explanation is not None
-    unexplained = explained and last.declared_test.p_value <= CONTRADICTED
+    unexplained = explained and last.declared_test.p_value <= CRITERION.significant
     if not unexplained and (explained or not last.null.hypothesis.effects):
         return grown
     bare = (replace(rounds[0], candidates=(), tied=(), profile=None),)
     gain = bare[0].null.cost - last.null.cost - len(last.null.point.sizes) + evidence
-    promising = _PROMISING * gain if last.anomaly.p_value > REMAINS else 0.0
+    promising = _PROMISING * gain if last.anomaly.p_value > CRITERION.significant else 0.0
     alone, alone_evidence = replace(learn, promising=promising).grown(bare)
     return chosen(grown, alone, alone_evidence - gain, last)
 
@@ -112,7 +106,7 @@ def chosen(
     if not learned:
         return grown
     increments = (NAME,)
-    if lead > _NAMES_LEAD:
+    if lead > CRITERION.lead:
         return (*alone[:-1], replace(alone[-1], posterior=_weighed({named.names: -lead, increments: 0.0})))
     if lead > _AS_GOOD or _accepted(grown) or _acts_on(learned) != _acts_on(named.null.hypothesis.effects):
         end = grown[-1]
@@ -164,10 +158,10 @@ class _Learning:
             # derivatives over a signal are flexible enough to describe what a first increment has wrong
             tried = [s for s in every if not (accepted and s.of_derivative)]
             least = 0.0
-            if last.anomaly.p_value > REMAINS:
+            if last.anomaly.p_value > CRITERION.significant:
                 if accepted:
                     break
-                least = _EVIDENT
+                least = CRITERION.lead
             candidates = self._candidates(last.null, last, tried, least)
             tied = _tied(candidates)
             rounds = (*rounds[:-1], replace(last, candidates=(*last.candidates, *candidates), tied=tied))

@@ -11,7 +11,8 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import OUTPUTS
 from airtruth.table import WIDTH, as_text, significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
-from airtruth.tracing.answer import ANOMALY_LEVEL, Evidence, TraceAnswer
+from airtruth.tracing.answer import Evidence, TraceAnswer
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.causes import DERIVATIVES
 from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
@@ -60,7 +61,7 @@ def verdict(answer: TraceAnswer) -> str:
             why = "no record was held out"
         elif answer.confirmed is False:
             why = "the held-out records are worse with the effects than without them"
-        elif answer.remaining.p_value > ANOMALY_LEVEL:
+        elif answer.remaining.p_value > CRITERION.significant:
             why = "the notes state the reason"
         else:
             why = f"a significant anomaly remains ({_evidence(answer.remaining)})"

@@ -3,7 +3,7 @@
 Quadratics about the declared aircraft, the fit without any effect and the best fit predict the evidence of every set of up to
 three effects. The best set without a refit is
 refitted from the predicted point, and its own quadratic gives its evidence with every explanation of the derivatives. A fit that
-leads is expanded in turn. The search ends when no set without a refit is predicted within `ODDS` of the best.
+leads is expanded in turn. The search ends when no set without a refit is predicted within the odds of the best.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.anomalies.omnibus import anomalies
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
@@ -29,8 +30,6 @@ from airtruth.tracing.selection.explanation import simplest
 from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior, normalised
 from airtruth.tracing.selection.set_table import SetTable
 
-ODDS: Final = 3.0
-"""Log-evidence behind the best set from which a set is not refitted [-] (judgement: odds of one in twenty)."""
 REFITS: Final = 30
 """Largest number of refits [-] (judgement: ten to forty seconds)."""
 MOST_EFFECTS: Final = 3
@@ -38,8 +37,6 @@ MOST_EFFECTS: Final = 3
 _HELD: Final = 1e-4
 """Variance of derivatives that are held as they are declared, over the declared one [-] (judgement: a hundredth of a standard
 deviation)."""
-_MISFIT: Final = 1e-6
-"""Probability of the anomaly of the best set below which every effect is refitted alone [-] (judgement: beyond doubt)."""
 NOTHING: Final[Mapping[str, tuple[float, float]]] = MappingProxyType({})
 """The kinematics tells of no error."""
 _HOPELESS: Final = 30.0
@@ -163,7 +160,7 @@ class _BestFirst:
     def _is_misfit(self, fitted: PosteriorFit) -> bool:
         """Whether a fit leaves an anomaly beyond doubt."""
         tests = anomalies(fitted, self.sets.problem, autoregression(fitted.innovations))
-        return len(tests) * min(test.p_value for test in tests) < _MISFIT
+        return len(tests) * min(test.p_value for test in tests) < CRITERION.certain
 
     def _sweep(self, rival: float) -> None:
         """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it.
@@ -255,7 +252,7 @@ class _BestFirst:
         if self._wants(best):
             return best
         left = (p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p))
-        least = best.weighed.log_evidence - ODDS
+        least = best.weighed.log_evidence + float(np.log(CRITERION.level))
         leading = max(
             (p for p in left if p.weighed.log_evidence > least),
             key=lambda p: p.weighed.log_evidence,
@@ -374,4 +371,4 @@ def _informed(effect: Effect, told: tuple[float, float] | None, temper: float) -
     return replace(effect, parameters=(own,))
 
 
-__all__ = ["NOTHING", "ODDS", "best_first"]
+__all__ = ["NOTHING", "best_first"]

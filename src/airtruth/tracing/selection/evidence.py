@@ -32,20 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.causes import DERIVATIVES
 from airtruth.tracing.selection.columns import EffectColumn, SizePriors, size_priors
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-WRONG_BY: Final = (3.0, 10.0)
-"""Standard deviation of a derivative whose declaration is wrong, over the declared one [-]: equal parts of a mixture
-(judgement: published uncertainties of derivatives are often too small by the first factor, and by up to the second)."""
-LOG_SAME_EVENT: Final = -1.0
-"""Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
-LOG_WRONG: Final = -1.0
-"""Logarithm of the prior odds of each further wrong declaration [-] (judgement); all sets of them together are as probable as
-none, whatever the number of derivatives."""
 _SINGULAR: Final = 1e-6
 """Least share of an information that remains beside the others of a set [-] (judgement: less is no other effect)."""
 _NEGLIGIBLE: Final = 15.0
@@ -175,7 +168,7 @@ class Quadratic:
             size = -slope[column] / (information[column, column] + prior.std**-2)
             spread += np.diag((size * prior.shape * c.cause.direction) ** 2)
         for i in c.freed:
-            spread[i, i] += (max(WRONG_BY) ** 2 - 1.0) * self.declared[i, i]
+            spread[i, i] += (max(CRITERION.wrong_by) ** 2 - 1.0) * self.declared[i, i]
         return spread
 
     def sets(self, most: int) -> list[Weighed]:
@@ -230,15 +223,18 @@ class Quadratic:
 
     @cached_property
     def _wrong(self) -> tuple[Declaration, ...]:
-        """The wrong declarations that are compared, each by every factor of `WRONG_BY`: every set of a few derivatives; of many,
-        all of them together and the sets that add one derivative to the best one, as long as the evidence grows."""
+        """The wrong declarations that are compared, each by every factor of `AnswerCriterion.wrong_by`: every set of a few derivatives.
+
+        Of many derivatives, they are all of them together, and the sets that add one to the best one as long as the evidence
+        grows.
+        """
         every = range(self.derivatives)
         if not self.wrong_allowed:
             return ()
         if self.derivatives <= _EVERY:
             subsets = (s for n in every for s in itertools.combinations(every, n + 1))
-            return tuple(self._declaration(s, by) for s in subsets for by in WRONG_BY)
-        found = [self._declaration(tuple(every), by) for by in WRONG_BY]
+            return tuple(self._declaration(s, by) for s in subsets for by in CRITERION.wrong_by)
+        found = [self._declaration(tuple(every), by) for by in CRITERION.wrong_by]
         wrong: tuple[int, ...] = ()
         least = -np.inf
         while len(wrong) < self.derivatives:
@@ -246,7 +242,7 @@ class Quadratic:
                 self._declaration(tuple(sorted((*wrong, i))), by)
                 for i in every
                 if i not in wrong
-                for by in WRONG_BY
+                for by in CRITERION.wrong_by
             ]
             found += grown
             logs = self.given(np.array([d.spread for d in grown]))[0] + [d.log_odds for d in grown]
@@ -263,8 +259,10 @@ class Quadratic:
             return Declaration((), spread, 0.0)
         at = list(wrong)
         spread[at, at] = (by**2 - 1.0) * np.diag(self.declared)[at]
-        every = np.log(len(WRONG_BY) * ((1.0 + np.exp(LOG_WRONG)) ** self.derivatives - 1.0))
-        return Declaration(wrong, spread, LOG_WRONG * len(wrong) - float(every))
+        every = np.log(
+            len(CRITERION.wrong_by) * ((1.0 + np.exp(CRITERION.log_wrong)) ** self.derivatives - 1.0)
+        )
+        return Declaration(wrong, spread, CRITERION.log_wrong * len(wrong) - float(every))
 
     def _singly(
         self, declarations: Sequence[Declaration], most: int
@@ -319,7 +317,7 @@ class Quadratic:
         of_event = np.array([c.event != "" for c in self.columns])
         for row in np.flatnonzero(of_event[chosen].sum(axis=1) > 1):
             together = self._log_odds[[i for i in chosen[row] if of_event[i]]]
-            total[row] += together.max() - together.sum() + LOG_SAME_EVENT * (len(together) - 1)
+            total[row] += together.max() - together.sum() + CRITERION.log_same_event * (len(together) - 1)
         return np.asarray(total)
 
     def _laplace(self, slope: Array, own: Array, chosen: Ints) -> tuple[Array, Array]:

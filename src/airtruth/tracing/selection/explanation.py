@@ -4,22 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.causes import DERIVATIVES
-
-AS_PROBABLE: Final = 0.1
-"""Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: a further cause
-is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd ed. (1961), appendix B)."""
-_AS_PROBABLE_IN_EVENT: Final = 0.5
-"""Posterior weight over that of the most probable effects from which fewer effects of the same event are preferred [-]
-(judgement: a changed loading changes CG, mass and inertia, as a rule)."""
-
-
-AS_GOOD: Final = 0.05
-"""Posterior weight over that of the answer from which a set explains the records as well [-] (convention: odds of one in
-twenty)."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +40,10 @@ def simplest(weights: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
     ----------
     weights : names of each set -> its posterior weight; at least one set.
     """
-    enough = AS_PROBABLE * max(weights.values())
+    enough = CRITERION.simpler * max(weights.values())
     fewest = min(events(n) for n, w in weights.items() if w >= enough)
     among = {n: w for n, w in weights.items() if w >= enough and events(n) == fewest}
-    likely = _AS_PROBABLE_IN_EVENT * max(among.values())
+    likely = CRITERION.even * max(among.values())
     return min((n for n, w in among.items() if w >= likely), key=lambda n: (len(n), -among[n]))
 
 
@@ -71,4 +59,4 @@ def events(effects: Sequence[str]) -> int:
     return own.count("") + len(set(own) - {""})
 
 
-__all__ = ["AS_GOOD", "AS_PROBABLE", "ExplainedDerivatives", "events", "shares", "simplest"]
+__all__ = ["ExplainedDerivatives", "events", "shares", "simplest"]

@@ -15,6 +15,7 @@ from airtruth.checks.poor import severe_m_s
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.physics.expected import EXPECTED
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
@@ -25,14 +26,8 @@ from airtruth.tracing.selection.refusal import Refusal
 
 Array = NDArray[np.float64]
 
-_SLIGHT: Final = 0.25
-"""Overshoot allowed to an effect that cancels a declared term, as a fraction of that term [-] (judgement: a flight tells a
-term in alpha_dot to about that)."""
 _ERRORS: Final = 2.0
 """Standard errors that count as a difference [-] (convention)."""
-_FREE_ERRORS: Final = 3.0
-"""Standard errors by which a free run may seem worse [-] (judgement: in rough air it consists mostly of gusts, and a
-smaller number rejects true effects)."""
 _SMALL_SHORTFALL: Final = 0.02
 """Share of its gain that a refit may still lack and count as converged [-] (judgement: rate limits and backlash give no
 smooth cost)."""
@@ -111,7 +106,7 @@ def tested_on_left_out(
         if not _is_loss(likelihood_gain):
             break
     free, covariance = _free_run_gain(problem, unaided, after, reference.weight)
-    loses = free.sum() < -_FREE_ERRORS * np.sqrt(max(float(covariance.sum()), 0.0))
+    loses = free.sum() < -CRITERION.far * np.sqrt(max(float(covariance.sum()), 0.0))
     in_channels = loses_in_two_channels(free.sum(axis=0), covariance)
     in_loop = reference.in_loop or reads_alpha(own)
     reasons = (
@@ -220,7 +215,7 @@ def size_reasons(effect: Effect, size: float, span_m: float, declared: float = 0
     span_m : wing span of the aircraft [m]; declared : size that the declared aircraft has already.
     """
     first = effect.parameters[0]
-    if first.sign * size < 0.0 and first.sign * (declared + size) < -_SLIGHT * abs(declared):
+    if first.sign * size < 0.0 and first.sign * (declared + size) < -CRITERION.slight * abs(declared):
         yield Refusal.WRONG_SIGN
     if abs(size) > first.spans * span_m:
         yield Refusal.BEYOND_ENDS
