@@ -223,7 +223,7 @@ class Quadratic:
 
     @cached_property
     def _wrong(self) -> tuple[Declaration, ...]:
-        """The wrong declarations that are compared, each by every factor of `AnswerCriterion.wrong_by`: every set of a few derivatives.
+        """The wrong declarations that are compared, each by every factor of the mixture: every set of a few derivatives.
 
         Of many derivatives, they are all of them together, and the sets that add one to the best one as long as the evidence
         grows.
