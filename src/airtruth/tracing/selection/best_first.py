@@ -39,9 +39,6 @@ _HELD: Final = 1e-4
 deviation)."""
 NOTHING: Final[Mapping[str, tuple[float, float]]] = MappingProxyType({})
 """The kinematics tells of no error."""
-_HOPELESS: Final = 30.0
-"""Log-evidence behind the best set from which a refit of one effect is of no use [-] (judgement: twice the Occam factors of
-three further effects)."""
 _SAME: Final = 0.05
 """Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 
@@ -133,7 +130,7 @@ class _BestFirst:
                 if swept or not self._is_misfit(fitted):
                     break
                 swept = True
-                self._sweep(fitted.cost + self.temper * _HOPELESS)
+                self._sweep()
                 limit = self.refits + REFITS
                 continue
             if not may_begin(self.advance, f"refit {' + '.join(following.names)}"):
@@ -162,13 +159,8 @@ class _BestFirst:
         tests = anomalies(fitted, self.sets.problem, autoregression(fitted.innovations))
         return len(tests) * min(test.p_value for test in tests) < CRITERION.certain
 
-    def _sweep(self, rival: float) -> None:
-        """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it.
-
-        Parameters
-        ----------
-        rival : cost above which a refit is of no use.
-        """
+    def _sweep(self) -> None:
+        """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it."""
         for effect in self.effects:
             key, first = frozenset((effect.key,)), effect.parameters[0]
             if key in self._fits or len(effect.parameters) > 1:
@@ -177,7 +169,7 @@ class _BestFirst:
                 return
             hypothesis = replace(self.hypothesis, effects=(effect,))
             size = np.array([(first.sign or 1.0) * first.material])
-            own = self.sets.fit_from_declared(hypothesis, size, self.null, rival)
+            own = self.sets.fit_from_declared(hypothesis, size, self.null)
             self.refits += 1
             self._enter(own)
 
@@ -291,8 +283,7 @@ class _BestFirst:
         own = self.sets.converged(hypothesis, start)
         self.refits += 1
         if hypothesis.effects and (own is None or own.cost > before.cost):
-            rival = np.inf if own is None else own.cost
-            again = self.sets.fit_from_declared(hypothesis, start.sizes, before, rival)
+            again = self.sets.fit_from_declared(hypothesis, start.sizes, before)
             self.refits += 1
             if again is not None and (own is None or again.cost < own.cost):
                 own = self.sets.converged(hypothesis, again.point) or again
@@ -300,7 +291,7 @@ class _BestFirst:
 
     def _enter(self, own: PosteriorFit | None) -> None:
         """Keep a refit, unless it is worse than the null that its set contains: it ended far from its optimum."""
-        if own is not None and not own.outrun and own.cost <= self.null.cost:
+        if own is not None and own.cost <= self.null.cost:
             key = frozenset(e.key for e in own.hypothesis.effects)
             self._fits.setdefault(key, []).append(expanded(self.sets.problem, own))
 

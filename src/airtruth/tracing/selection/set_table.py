@@ -70,12 +70,7 @@ class SetTable:
         return own if known.converged else self.fit_from(hypothesis, own.point, near=own)
 
     def fit_from(
-        self,
-        hypothesis: Hypothesis,
-        start: Parameters,
-        *,
-        near: PosteriorFit | None = None,
-        rival: float = np.inf,
+        self, hypothesis: Hypothesis, start: Parameters, *, near: PosteriorFit | None = None
     ) -> PosteriorFit | None:
         """The fit of a set from a start, which may lead to another optimum; the table keeps the better.
 
@@ -87,14 +82,14 @@ class SetTable:
         known = self._best.get(key)
         if known is not None and known.converged and begin in self._tried:
             return in_order_of(known, hypothesis)
-        own = fit(self.problem, hypothesis, start, near=near, rival=rival, only_better=np.isfinite(rival))
-        if own is not None and not own.outrun:
+        own = fit(self.problem, hypothesis, start, near=near)
+        if own is not None:
             self._tried.add(begin)
             self.keep(own)
         return own
 
     def fit_from_declared(
-        self, hypothesis: Hypothesis, sizes: Array, null: PosteriorFit, rival: float = np.inf
+        self, hypothesis: Hypothesis, sizes: Array, null: PosteriorFit
     ) -> PosteriorFit | None:
         """`fit_from` the declared aircraft, and not from a null, which may have absorbed an effect.
 
@@ -103,10 +98,9 @@ class SetTable:
         Parameters
         ----------
         sizes : of the effects, at which the search begins; null : a fit whose derivatives the first steps use.
-        rival : cost above which a fit is of no use; the table does not keep one that ends there early.
         """
         start = initial_parameters(self.problem, hypothesis, sizes, _FIRST_ITERATIONS).with_levels(null.point)
-        return self.fit_from(hypothesis, start, near=null, rival=rival)
+        return self.fit_from(hypothesis, start, near=null)
 
     def converged(
         self, hypothesis: Hypothesis, start: Parameters, *, near: PosteriorFit | None = None
