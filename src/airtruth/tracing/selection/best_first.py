@@ -160,7 +160,10 @@ class _BestFirst:
         return len(tests) * min(test.p_value for test in tests) < CRITERION.certain
 
     def _sweep(self) -> None:
-        """Refit every effect alone from the declared aircraft: about a fit that lacks a large one no quadratic shows it."""
+        """Refit every effect alone from the declared aircraft, until one of them leaves no anomaly beyond doubt.
+
+        About a fit that lacks a large effect no quadratic shows it.
+        """
         for effect in self.effects:
             key, first = frozenset((effect.key,)), effect.parameters[0]
             if key in self._fits or len(effect.parameters) > 1:
@@ -172,6 +175,8 @@ class _BestFirst:
             own = self.sets.fit_from_declared(hypothesis, size, self.null)
             self.refits += 1
             self._enter(own)
+            if own is not None and own.cost < self.null.cost and not self._is_misfit(own):
+                return
 
     def _as_declared(self) -> PosteriorFit | None:
         """The fit with the declared derivatives: those of the null may have absorbed an effect."""
