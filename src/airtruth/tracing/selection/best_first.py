@@ -337,11 +337,11 @@ class _BestFirst:
 
         for key in self._fits:
             best: dict[tuple[tuple[int, ...], tuple[int, ...], float], EvaluatedSet] = {}
-            for p in self._of_fit(key):
+            for p in sorted(self._of_fit(key), key=lambda p: (p.is_refitted, p.weighed.log_evidence)):
                 d = p.weighed.declaration
-                row = p.weighed.columns, d.wrong, float(np.trace(d.spread))
-                if row not in best or p.weighed.log_evidence > best[row].weighed.log_evidence:
-                    best[row] = p
+                best[p.weighed.columns, d.wrong, float(np.trace(d.spread))] = (
+                    p  # the last one remains: a refit
+                )
             for p in best.values():
                 add(p)
         for key, p in self._predicted.items():
