@@ -39,6 +39,8 @@ _HELD: Final = 1e-4
 deviation)."""
 NOTHING: Final[Mapping[str, tuple[float, float]]] = MappingProxyType({})
 """The kinematics tells of no error."""
+_SCALE: Final = 2.0
+"""Largest gain over the predicted one that is allowed for [-] (judgement: a quadratic that errs by more tells nothing)."""
 _SAME: Final = 0.05
 """Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 
@@ -248,18 +250,41 @@ class _BestFirst:
         simplest one that an answer can state, and those of one effect less: far from its fit a quadratic predicts badly."""
         if self._wants(best):
             return best
-        left = (p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p))
+        left = [p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p)]
         least = best.weighed.log_evidence + float(np.log(CRITERION.level))
-        leading = max(
-            (p for p in left if p.weighed.log_evidence > least),
-            key=lambda p: p.weighed.log_evidence,
-            default=None,
-        )
-        if leading is not None:
-            return leading
+        scales = {id(x): self._scale(x) for x in self._expansions}
+        within = {k: e for k, p in enumerate(left) if (e := self._expected(p, scales)) > least}
+        if within:
+            return left[max(within, key=lambda k: within[k])]
         logs, evaluated = self._evidence()
         answer = evaluated[simplest(normalised(logs))]
         return next((p for p in (answer, *self._smaller(answer)) if self._wants(p)), None)
+
+    def _scale(self, expansion: Expansion) -> float:
+        """Largest gain in log-evidence that refits have shown, over the one that a quadratic predicted: 1 to `_SCALE`.
+
+        Far from its fit a quadratic errs by a share of the gain, and by the same share for effects that look alike.
+        """
+        told = self._told_by(expansion)
+        base = told.get(frozenset(e.key for e in expansion.last.hypothesis.effects))
+        ratios = [1.0]
+        for key in self._fits:
+            if base is None or told.get(key, base) is base:
+                continue
+            predicted = told[key].weighed.log_evidence - base.weighed.log_evidence
+            every = [p.weighed.log_evidence for p in self._of_fit(key)]
+            if every and predicted > 1.0:
+                ratios.append((max(every) - base.weighed.log_evidence) / predicted)
+        return min(max(ratios), _SCALE)
+
+    def _expected(self, p: EvaluatedSet, scales: Mapping[int, float]) -> float:
+        """Log-evidence of a set without a refit if its gain is as much larger than predicted as that of other sets."""
+        own = frozenset(e.key for e in p.expansion.last.hypothesis.effects)
+        base = self._told_by(p.expansion).get(own)
+        log = p.weighed.log_evidence
+        if base is None or log < base.weighed.log_evidence:
+            return log
+        return log + (scales[id(p.expansion)] - 1.0) * (log - base.weighed.log_evidence)
 
     def _smaller(self, answer: EvaluatedSet) -> Iterator[EvaluatedSet]:
         """The sets without one of the effects of the filter, whose refits show that the answer needs each."""
