@@ -95,7 +95,7 @@ def rules() -> str:
         f"| `{name}` | {getattr(CRITERION, name)} | {_cell(meaning)} |"
         for name, meaning in attributes(AnswerCriterion)
     ]
-    head = "`airtruth.tracing.criterion.AnswerCriterion`: the constants that decide what a trace answers; its provenance has them"
+    head = "`airtruth.tracing.criterion.AnswerCriterion`: constants that decide what a trace answers; the provenance of a result states them"
     parts = [
         "\n".join(
             ["## criterion", "", f"{head}.", "", "| constant | value | meaning |", "|---|---|---|", *own]

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from typing import Final
 
-from airtruth.table import WIDTH, Group, Table, as_text
+from airtruth.table import Group, Table, as_text
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.presentation.candidates import probability
 from airtruth.tracing.presentation.derivative_table import MOST_COLUMNS, derivative_table
 from airtruth.tracing.presentation.error_table import MEANING, error_table
-from airtruth.tracing.presentation.odds import odds_lines
 from airtruth.tracing.presentation.text import (
     candidate_lines,
     effect_line,
-    records_line,
+    opening,
     sets_line,
-    verdict,
     wrapped,
 )
 
@@ -34,11 +31,7 @@ Block = tuple[str, ...]
 def as_brief_text(answer: TraceAnswer) -> str:
     """Verdict, effects, and as much of the rest as fits into `MOST_LINES`; the last line states what is left out."""
     head = [
-        tuple(
-            line
-            for words in (verdict(answer), *odds_lines(answer), records_line(answer))
-            for line in textwrap.wrap(words, WIDTH)
-        ),
+        tuple(opening(answer)),
         tuple(
             line
             for e in answer.effects

@@ -31,11 +31,7 @@ def as_trace_text(answer: TraceAnswer) -> str:
     """The answer of a trace as plain text, with every table."""
     tolerances = tolerance_table(answer)
     blocks = [
-        [
-            line
-            for words in (verdict(answer), *odds_lines(answer), records_line(answer))
-            for line in textwrap.wrap(words, WIDTH)
-        ],
+        opening(answer),
         *([effect_line(e), *effect_details(e, answer.credit.get(e.key))] for e in answer.effects),
         as_text(error_table(answer)).rstrip("\n").splitlines(),
         *([as_text(tolerances).rstrip("\n").splitlines()] if tolerances else []),
@@ -50,6 +46,12 @@ def as_trace_text(answer: TraceAnswer) -> str:
         blocks.append([f"Updated aircraft: {answer.updated_aircraft}"])
     blocks += [wrapped("Note", note + ".") for note in answer.notes]
     return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def opening(answer: TraceAnswer) -> list[str]:
+    """Lines of the verdict, the posterior of its set, and the records."""
+    sentences = (verdict(answer), *odds_lines(answer), records_line(answer))
+    return [line for sentence in sentences for line in textwrap.wrap(sentence, WIDTH)]
 
 
 def verdict(answer: TraceAnswer) -> str:
@@ -354,7 +356,7 @@ __all__ = [
     "increment_words",
     "interval",
     "largest_words",
-    "records_line",
+    "opening",
     "sets_line",
     "unit_of",
     "verdict",

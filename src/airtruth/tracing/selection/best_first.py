@@ -1,9 +1,9 @@
 """Best-first search over sets of effects: quadratics predict their evidence, and the best are refitted.
 
 Quadratics about the declared aircraft, the fit without any effect and the best fit predict the evidence of every set of up to
-three effects. The best set without a refit is
-refitted from the predicted point, and its own quadratic gives its evidence with every explanation of the derivatives. A fit that
-leads is expanded in turn. The search ends when no set without a refit is predicted within the odds of the best.
+three effects. The best set without a refit is refitted from the predicted point, and its own quadratic gives its evidence with
+every explanation of the derivatives. A fit that leads is expanded in turn. The search ends when no set without a refit is
+expected within odds of one in twenty of the best.
 """
 
 from __future__ import annotations
