@@ -95,7 +95,10 @@ def rules() -> str:
         f"| `{name}` | {getattr(CRITERION, name)} | {_cell(meaning)} |"
         for name, meaning in attributes(AnswerCriterion)
     ]
-    head = "`airtruth.tracing.criterion.AnswerCriterion`: constants that decide what a trace answers; the provenance of a result states them"
+    head = (
+        "`airtruth.tracing.criterion.AnswerCriterion`: constants that decide what a trace answers; the provenance of a result "
+        "states them"
+    )
     parts = [
         "\n".join(
             ["## criterion", "", f"{head}.", "", "| constant | value | meaning |", "|---|---|---|", *own]
