@@ -47,6 +47,22 @@ def test_leaves_a_smooth_elevator_alone(frequency):
     assert (servo_bend(de[None]) == 0.0).all()
 
 
+@pytest.mark.parametrize("rate_hz", [10, 20, 50])
+@pytest.mark.parametrize("seed", range(5))
+def test_smooth_inputs_of_a_pilot_between_rests_show_no_servo(rate_hz, seed):
+    """Doublets whose edges take 0.5 s, between rests that fill half of the record."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(24 * 400) / 400.0
+    command, start = np.zeros_like(t), 2.0
+    for k in range(4):
+        end = start + rng.uniform(0.5, 1.2)
+        command[(t >= start) & (t < end)] = (-1.0) ** k * rng.uniform(0.5, 2.0)
+        start = end + rng.choice([0.0, 2.0])
+    kernel = np.convolve(np.ones(100), np.ones(100)) / 1e4
+    de = np.convolve(command, kernel, "same")[:: 400 // rate_hz] * DEG
+    assert (servo_bend(de[None]) == 0.0).all()
+
+
 def test_leaves_noise_and_rest_alone():
     rng = np.random.default_rng(4)
     assert (servo_bend(rng.normal(size=(5, 250)) * 1e-3) == 0.0).all()

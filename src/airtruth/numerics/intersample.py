@@ -44,6 +44,9 @@ _NOISE: Final = 6.0
 its noise where the surface rests in most cells."""
 _STILL: Final = 0.005
 """The same over the largest increment [-]; judgement, for a surface without noise."""
+_EXPLAINS: Final = 0.7
+"""Moving cells with the decay of a servo over those of the surface itself below which it shows one [-]; judgement: held commands
+give 0.03 to 0.61, and smooth inputs of a pilot 0.75 or more. Of a servo that settles within the cell they give 1 - rho."""
 _AGREEING: Final = 0.5
 """Least lower quartile of the ratios over their median that shows a servo [-]; judgement."""
 _SURE: Final = 3.0
@@ -62,7 +65,8 @@ def decay_of(time_s: float, dt_s: float) -> float:
 def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) -> Array:
     """Decay rho of a servo over a sample period, by neighbouring increments of the surface.
 
-    It is the weighted median of their ratio, or a lower quantile with which the command moves in far fewer cells.
+    It is the weighted median of their ratio, or a lower quantile with which the command moves in far fewer cells. The command has
+    to move in far fewer cells than the surface: smooth inputs of a pilot have ratios of their own.
 
     A step within a cell gives ratios above that of the servo. The median is among them where the servo settles within two or
     three samples. A declared decay of such a servo is taken, unless the command moves in far fewer cells with another one. A
@@ -94,7 +98,8 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
     own = decays[row, best]
     is_sure = own * weights[row, at[row, best]] >= _SURE * math.sqrt(2.0) * noise_std_rad
     agree = is_fewer | (decays[:, _QUARTER] > _AGREEING * decays[:, _MEDIAN])
-    own = np.where(agree & is_sure, own, np.nan)
+    explains = moving[row, best] < np.fmax(_EXPLAINS, 1.0 - own) * moving[:, _NONE]
+    own = np.where(agree & is_sure & explains, own, np.nan)
     if not 0.0 < declared < _SETTLES:
         return own
     others = np.minimum(

@@ -15,7 +15,7 @@ from airtruth.checks.airspeed import low_passed, speeds
 from airtruth.errors import LogError
 from airtruth.identification.lateral.observation import known_inputs
 from airtruth.logs.flight_log import Batch, FlightLog
-from airtruth.numerics.whiteness import is_white
+from airtruth.numerics.whiteness import is_white, noise_at_rest
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.motion_parts import Control
@@ -27,6 +27,10 @@ Array = NDArray[np.float64]
 
 _QUIET_S: Final = 0.2
 """Width of the median that replaces a control at rest [s] (judgement)."""
+_REST_S: Final = 1.0
+"""Window that shows the noise of a control at rest [s] (judgement: half of the rest before a manoeuvre)."""
+_LEAST_REST: Final = 8
+"""Samples of such a window at least [-] (judgement)."""
 _SHORT_REST_S: Final = 0.5
 """Length of a rest of a control up to which the error of its mean counts as noise [s] (judgement: half of a short period)."""
 _QUIET_STD: Final = 3.0
@@ -38,12 +42,12 @@ class MeasuredControl(NamedTuple):
 
     Attributes
     ----------
-    noise_rad : standard deviation of the noise of the measured surface [rad].
+    noise_rad : standard deviation of the noise of the measured surface [rad]; None where none is declared.
     servo_s : time constant of the servo [s]; 0 for none.
     rate_rad_s : its rate limit [rad/s].
     """
 
-    noise_rad: float = 0.0
+    noise_rad: float | None = None
     servo_s: float = 0.0
     rate_rad_s: float = math.inf
 
@@ -56,7 +60,7 @@ def measured_controls(aircraft: Aircraft, motion: Motion) -> tuple[MeasuredContr
         servo = getattr(aircraft.file, control.actuator)
         found.append(
             MeasuredControl(
-                sensor.noise_std.value if sensor else 0.0,
+                (sensor.noise_std.value or None) if sensor else None,
                 0.0 if servo is None else 1.0 / (2.0 * math.pi * servo.bandwidth.value),
                 math.inf if servo is None else servo.rate_limit.value,
             )
@@ -69,7 +73,8 @@ def read(
 ) -> list[Signals]:
     """The runs of a validated log.
 
-    Where a control is at rest but for the noise of its sensor it is smoothed, because the noise moves the model's aircraft,
+    The noise of a control without a declared sensor is that of its samples at rest (`airtruth.numerics.whiteness.noise_at_rest`).
+    Where a control is at rest but for this noise it is smoothed, because the noise moves the model's aircraft,
     and backlash and rate limits would take each new extreme for motion.
     A control between samples has the area of the cubic through the four nearest samples and the
     corners of a first-order servo where the record shows one (`airtruth.numerics.intersample`); in a coarse log it is
@@ -172,8 +177,9 @@ class _Surface(NamedTuple):
 def _surface(
     channels: Mapping[str, Array], control: Control, dt_s: float, cells: int, declared: MeasuredControl
 ) -> _Surface:
-    std_rad, servo_s, rate_rad_s = declared
+    noise_rad, servo_s, rate_rad_s = declared
     raw = np.asarray(channels[control.channel], dtype=np.float64)
+    std_rad = noise_at_rest(raw, _rest_samples(dt_s)) if noise_rad is None else noise_rad
     rate = np.asarray(channels[control.damped], dtype=np.float64)
     is_fast = servo_s > 0.0 and dt_s <= LONGEST_STEP_S
     damper = find_damper(raw, rate, dt_s, servo_s, std_rad) if is_fast else None
@@ -186,6 +192,11 @@ def _surface(
     rest = _quiet(raw - own[::cells], dt_s, std_rad)
     pilot = read_between(rest, dt_s, cells, std_rad, servo_s, rate_rad_s)
     return _Surface(pilot._replace(surface_rad=pilot.surface_rad + own), 0.0, np.zeros(0))
+
+
+def _rest_samples(dt_s: float) -> int:
+    """Samples of a window that shows the noise of a control at rest."""
+    return max(_LEAST_REST, round(_REST_S / dt_s))
 
 
 def _remaining(moving: NDArray[np.bool_], dt_s: float, std_rad: float) -> Array:

@@ -3,7 +3,7 @@
 Quadratics about the declared aircraft, the fit without any effect and the best fit predict the evidence of every set of up to
 three effects. The best set without a refit is refitted from the predicted point, and its own quadratic gives its evidence with
 every explanation of the derivatives. A fit that leads is expanded in turn. The search ends when no set without a refit is
-expected within odds of one in twenty of the best.
+expected within odds of one in twenty of the best one that passes the tests.
 """
 
 from __future__ import annotations
@@ -25,9 +25,11 @@ from airtruth.tracing.inference.robust import inflation
 from airtruth.tracing.inference.whitening import autoregression
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.columns import informed
 from airtruth.tracing.selection.expansion import Expansion, expanded
 from airtruth.tracing.selection.explanation import simplest
 from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior, normalised
+from airtruth.tracing.selection.predictive import Soundness
 from airtruth.tracing.selection.set_table import SetTable
 
 REFITS: Final = 30
@@ -88,6 +90,7 @@ class _BestFirst:
         self.effects, self.advance = effects, advance
         self.causes = tuple(c for c in declared.causes if c.key not in held)
         self.wrong_allowed = declared.wrong_allowed
+        self.is_sound = Soundness(sets.problem, null)
         self.temper = 1.0
         self.refits = 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
@@ -95,6 +98,7 @@ class _BestFirst:
         self._expansions: list[Expansion] = []
         self._told: dict[tuple[int, float], dict[frozenset[str], EvaluatedSet]] = {}
         self._predicted: dict[frozenset[str], EvaluatedSet] = {}
+        self._refused: list[PosteriorFit] = []
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
 
     def run(self, known: Sequence[Mapping[str, float]], told: Mapping[str, tuple[float, float]]) -> Posterior:
@@ -105,7 +109,7 @@ class _BestFirst:
             self._begin_at(sizes)
         self._tempered(self._best().expansion.last)
         if told and self.temper > 1.0 + _SAME:
-            self.effects = tuple(_informed(e, told.get(e.key), self.temper) for e in self.effects)
+            self.effects = tuple(informed(e, told.get(e.key), self.temper) for e in self.effects)
             self._fits = {frozenset(): alone}
             for sizes in known:
                 self._begin_at(sizes)
@@ -128,6 +132,9 @@ class _BestFirst:
                 seen.append(fitted)
                 self._predict(fitted)
             following = self._following(best)
+            if following is None and best.is_refitted and not self.is_sound(fitted):
+                self._refused.append(fitted)
+                continue
             if following is None or self.refits >= limit:
                 if swept or not self._is_misfit(fitted):
                     break
@@ -143,7 +150,7 @@ class _BestFirst:
             key: min((e.last for e in every), key=lambda f: (f.hypothesis.spread is not None, f.cost))
             for key, every in self._fits.items()
         }
-        return Posterior(normalised(logs), evaluated, fits, null, self.refits, self.temper)
+        return Posterior(normalised(logs), evaluated, fits, null, self.refits, self.temper, self.is_sound)
 
     def _begin_at(self, known: Mapping[str, float]) -> None:
         """Refit a set from the declared aircraft at known values."""
@@ -198,9 +205,10 @@ class _BestFirst:
         return True
 
     def _best(self) -> EvaluatedSet:
-        """The most probable set with a refit."""
+        """The most probable set with a refit that no test has refused."""
         every = [p for key in self._fits for p in self._of_fit(key)]
-        return max(every, key=lambda p: p.weighed.log_evidence)
+        left = [p for p in every if not any(p.expansion.last is fitted for fitted in self._refused)]
+        return max(left or every, key=lambda p: p.weighed.log_evidence)
 
     def _of_fit(self, key: frozenset[str]) -> list[EvaluatedSet]:
         """The sets with some effects of the filter that their fits weigh: with each explanation of the derivatives."""
@@ -373,23 +381,6 @@ class _BestFirst:
             if key not in self._fits and self._is_new(p):
                 add(p)
         return logs, evaluated
-
-
-def _informed(effect: Effect, told: tuple[float, float] | None, temper: float) -> Effect:
-    """An effect with what the kinematics tells of its size.
-
-    The likelihood of the filter holds the kinematics too, but divided by the ratio of variances. What the kinematics tells alone,
-    without any error of the aerodynamic model, has the share of the information that this leaves out.
-    """
-    first = effect.parameters[0]
-    if told is None or first.reciprocal or len(effect.parameters) > 1:
-        return effect
-    value, std = told
-    share = 1.0 - 1.0 / temper
-    own = replace(
-        first, prior_mean=first.size(value), prior_std=std / float(np.sqrt(share)), prior_weight=temper
-    )
-    return replace(effect, parameters=(own,))
 
 
 __all__ = ["NOTHING", "best_first"]

@@ -12,6 +12,7 @@ from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.evidence import Quadratic, Weighed
 from airtruth.tracing.selection.expansion import Expansion
 from airtruth.tracing.selection.explanation import ExplainedDerivatives, shares, simplest
+from airtruth.tracing.selection.predictive import Soundness
 
 Names = tuple[str, ...]
 """Names of a set, sorted."""
@@ -83,6 +84,7 @@ class Posterior:
     null : fit without any effect.
     refits : number of refits, that without any effect included.
     temper : long-run variance of the slopes of the likelihood over that of white innovations [-].
+    is_sound : the tests that a fit of an answer has to pass.
     """
 
     weights: Mapping[Names, float]
@@ -91,6 +93,7 @@ class Posterior:
     null: PosteriorFit
     refits: int
     temper: float
+    is_sound: Soundness
 
     @property
     def simplest(self) -> Names:

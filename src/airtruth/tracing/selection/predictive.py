@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -126,10 +127,38 @@ def reads_alpha(own: PosteriorFit) -> bool:
     return any(e.alpha_slope_per_rad != 0.0 for e in errors)
 
 
-def predicts_records_left_out(problem: TraceProblem, null: PosteriorFit, fitted: PosteriorFit) -> bool:
-    """Whether a fit with effects worsens neither likelihood nor free run of records left out, against the null."""
-    gain = 2.0 * (null.cost - fitted.cost)
-    return not tested_on_left_out(problem, fitted, reference_of(problem, null), gain).reasons
+@dataclass(frozen=True)
+class Soundness:
+    """Whether fits pass the tests that count whatever their evidence; each fit is tested once.
+
+    Attributes
+    ----------
+    problem, null : what is fitted, and the fit without any effect.
+    """
+
+    problem: TraceProblem
+    null: PosteriorFit
+    _known: dict[int, tuple[PosteriorFit, bool]] = field(default_factory=dict, repr=False)
+
+    def __call__(self, fitted: PosteriorFit) -> bool:
+        """Whether a fit has converged to plausible sizes, and is no worse than the null on records left out."""
+        if id(fitted) not in self._known:
+            self._known[id(fitted)] = fitted, self._is_sound(fitted)  # the fit lives as long as its number
+        return self._known[id(fitted)][1]
+
+    def _is_sound(self, fitted: PosteriorFit) -> bool:
+        gain = 2.0 * (self.null.cost - fitted.cost)
+        if not has_converged(fitted, gain):
+            return False
+        if not fitted.hypothesis.effects:
+            return True
+        return _is_plausible(self.problem, fitted) and not (
+            tested_on_left_out(self.problem, fitted, self._reference, gain).reasons
+        )
+
+    @cached_property
+    def _reference(self) -> Reference:
+        return reference_of(self.problem, self.null)
 
 
 def loses_in_two_channels(gains: Array, covariance: Array) -> bool:
@@ -161,7 +190,7 @@ def implausibility(problem: TraceProblem, effect: Effect, own: PosteriorFit) -> 
     yield from shape_reasons(effect, sizes)
 
 
-def is_plausible(problem: TraceProblem, own: PosteriorFit) -> bool:
+def _is_plausible(problem: TraceProblem, own: PosteriorFit) -> bool:
     """Whether the estimates of every effect of a fit are accepted, and its derivatives and gusts are possible."""
     named = (e for e in own.hypothesis.effects if not isinstance(e, Increment))
     is_possible = _has_possible_signs(problem, own) and _has_possible_gusts(problem, own)
@@ -275,10 +304,9 @@ def _is_loss(gains: Array) -> bool:
 
 __all__ = [
     "Reference",
+    "Soundness",
     "has_converged",
     "implausibility",
-    "is_plausible",
-    "predicts_records_left_out",
     "reference_of",
     "tested_on_left_out",
 ]

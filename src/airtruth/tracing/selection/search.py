@@ -19,7 +19,6 @@ from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.explanation import shares, simplest
 from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior
-from airtruth.tracing.selection.predictive import has_converged, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.rounds import SearchRound, scored
 from airtruth.tracing.selection.set_table import SetTable, in_order_of
 
@@ -55,13 +54,11 @@ def search(
     found = best_first(sets, hypothesis, start, effects, declared, advance, known, told)
     if found is None:
         return ()
-    chosen, left = _chosen(sets, found, required)
+    chosen, left = _chosen(found, required)
     return _Stated(sets, tuple(effects), seed, advance).rounds(replace(found, weights=left), chosen)
 
 
-def _chosen(
-    sets: SetTable, found: Posterior, required: Collection[str]
-) -> tuple[EvaluatedSet | None, dict[Names, float]]:
+def _chosen(found: Posterior, required: Collection[str]) -> tuple[EvaluatedSet | None, dict[Names, float]]:
     """The set of the answer, None for none, and the weights of the sets without those that were refused."""
     left = {
         names: weight
@@ -71,21 +68,11 @@ def _chosen(
     best = None
     while any(left.values()) and (names := simplest(left)):
         best = found.evaluated[names]
-        if best.is_refitted and _is_sound(sets, found.null, best.expansion.last):
+        if best.is_refitted and found.is_sound(best.expansion.last):
             break
         best = None
         del left[names]
     return best, shares(left if any(left.values()) else {(): 1.0})
-
-
-def _is_sound(sets: SetTable, null: PosteriorFit, fitted: PosteriorFit) -> bool:
-    """Whether a fit has converged to plausible sizes, and is no worse than the null on records left out."""
-    if not has_converged(fitted, 2.0 * (null.cost - fitted.cost)):
-        return False
-    named = fitted.hypothesis.effects
-    return not named or (
-        is_plausible(sets.problem, fitted) and predicts_records_left_out(sets.problem, null, fitted)
-    )
 
 
 @dataclass(frozen=True)
