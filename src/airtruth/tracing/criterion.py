@@ -27,15 +27,15 @@ class AnswerCriterion:
         contradict each other, are no "none", and an anomaly of the best set has every effect refitted alone. One of 140 null
         trials has 1.4e-7.
     simpler : posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement:
-        a further cause is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd
-        ed. (1961), appendix B).
+        a further cause is named where the odds for it are substantial, beyond the square root of ten, by H. Jeffreys, Theory of
+        Probability, 3rd ed. (1961), appendix B).
     even : the same for fewer effects of one event [-] (judgement: a changed loading changes CG, mass and inertia, as a
         rule), and posterior probability of a name below which it is provisional.
     wrong_by : standard deviation of a derivative whose declaration is wrong, over the declared one [-]: equal parts of a
         mixture (judgement: published uncertainties of derivatives are often too small by the first factor, and by up to the
         second).
-    log_wrong : logarithm of the prior odds of each further wrong declaration [-] (judgement); all sets of them together are
-        as probable as none, whatever the number of derivatives.
+    log_wrong : logarithm of the prior odds of all sets of wrong declarations together, whatever the number of derivatives, and of
+        each further wrong one [-] (judgement).
     log_same_event : logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three).
     far : standard deviations that count as far [-] (convention): a free run of records left out that gets worse by more
         refuses a set, and a cause whose size is as many standard deviations of its prior is provisional.
@@ -53,7 +53,7 @@ class AnswerCriterion:
     declared: float = 0.005
     differ: float = 1e-4
     certain: float = 1e-6
-    simpler: float = 0.1
+    simpler: float = 0.3
     even: float = 0.5
     wrong_by: tuple[float, float] = (3.0, 10.0)
     log_wrong: float = -1.0

@@ -262,7 +262,7 @@ class Quadratic:
         every = np.log(
             len(CRITERION.wrong_by) * ((1.0 + np.exp(CRITERION.log_wrong)) ** self.derivatives - 1.0)
         )
-        return Declaration(wrong, spread, CRITERION.log_wrong * len(wrong) - float(every))
+        return Declaration(wrong, spread, CRITERION.log_wrong * (1 + len(wrong)) - float(every))
 
     def _singly(
         self, declarations: Sequence[Declaration], most: int

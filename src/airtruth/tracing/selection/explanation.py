@@ -32,7 +32,7 @@ class ExplainedDerivatives:
 
 
 def simplest(weights: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
-    """The set of the fewest events against which the odds of the most probable one are not strong.
+    """The set of the fewest events against which the odds of the most probable one are not substantial.
 
     Of sets of as many events, it has the fewest effects that are half as probable as the best of them.
 
