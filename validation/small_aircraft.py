@@ -2,8 +2,7 @@
 
     python -m validation.small_aircraft --seed 1 --trials 10 [--gust 0.35] [--effect elevator_delay] [--drawn]
 
-The truth is a longitudinal simulation of its own: a rigid body, lift and moment linear in angle of attack, pitch rate and
-elevator, a parabolic drag polar, constant thrust, vertical and horizontal Dryden gusts, and Runge-Kutta steps of 2.5 ms. The
+The truth is that of `validation.pitch_truth` with constant thrust, vertical and horizontal Dryden gusts. The
 tracer gets logs at 50 Hz, or another rate, and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect.
 The values of the file are those of the truth, or with ``--drawn`` the truth has derivatives, mass and inertia from their declared
 uncertainty. A trial depends on its seed and the options alone.
@@ -28,6 +27,8 @@ from airtruth.aircraft import Aircraft
 from airtruth.logs.flight_log import FlightLog
 from airtruth.tracing import TraceOptions, trace
 from airtruth.units import DEG, G0
+from validation import pitch_truth
+from validation.pitch_truth import STEP_S, Body
 
 Array = NDArray[np.float64]
 
@@ -40,10 +41,8 @@ DRAG: Final = (0.028, 0.042)
 DENSITY_KG_M3, AIRSPEED_M_S = 1.2075, 22.0
 SERVO_S, RATE_RAD_S = 1.0 / (2.0 * np.pi * 7.0), 250.0 * DEG
 ACCELEROMETER_M = 0.05
-RECORDS, DURATION_S, STEP_S, EVERY = 6, 9.0, 0.0025, 8
+RECORDS, DURATION_S, EVERY = 6, 9.0, 8
 GUST_LENGTHS_M: Final = (80.0, 40.0)
-WARM: Final = 4000
-"""Steps of the gusts before a record."""
 NOISE: Final = {
     "airspeed_m_s": 0.25,
     "alpha_rad": 0.15 * DEG,
@@ -121,6 +120,25 @@ class Truth:
     inertia_kg_m2: float = INERTIA_KG_M2
     effect: str | None = None
 
+    @property
+    def body(self) -> Body:
+        """The aircraft with its effect."""
+        amounts = {self.effect: EFFECTS[self.effect]} if self.effect else {}
+        return Body(
+            mass_kg=self.mass_kg,
+            inertia_kg_m2=self.inertia_kg_m2,
+            area_m2=AREA_M2,
+            chord_m=CHORD_M,
+            density_kg_m3=DENSITY_KG_M3,
+            airspeed_m_s=AIRSPEED_M_S,
+            lift=self.lift,
+            moment=self.moment,
+            drag=DRAG,
+            effectiveness=amounts.get("elevator_effectiveness", 1.0),
+            fade=amounts.get("elevator_fade", 0.0),
+            moment_break=(amounts.get("cm_alpha_nonlinear", 0.0), BREAK_RAD),
+        )
+
 
 def drawn(seed: int, effect: str | None = None) -> Truth:
     """An aircraft whose derivatives, mass and inertia are drawn from their declared uncertainty."""
@@ -163,15 +181,11 @@ def flight_log(
     alpha, elevator, thrust = trimmed(truth)
     surface = _servo(elevator + _commands(rng, t), elevator)
     late_s = EFFECTS["elevator_delay"] if truth.effect == "elevator_delay" else 0.0
-    gusts = _gusts(rng, steps + 1, gust_m_s)
+    gusts = pitch_truth.gusts(rng, (steps + 1, RECORDS), gust_m_s, GUST_LENGTHS_M, AIRSPEED_M_S)
     state = np.zeros((5, RECORDS))
     state[0], state[1], state[3] = AIRSPEED_M_S * np.cos(alpha), AIRSPEED_M_S * np.sin(alpha), alpha
     acting = np.stack([np.interp(t - late_s, t, one) for one in surface])
-    states, forces = np.empty((steps + 1, 5, RECORDS)), np.empty((steps + 1, 5, RECORDS))
-    for k in range(steps + 1):
-        states[k], forces[k] = state, _forces(truth, state, acting[:, k], thrust, gusts[k])
-        if k < steps:
-            state = _stepped(truth, state, acting[:, k : k + 2], thrust, gusts[k : k + 2])
+    states, forces = pitch_truth.flown(truth.body, state, acting, thrust, gusts)
     u, w, q, theta, altitude = np.moveaxis(states, 1, 0)
     ax, az, q_dot, airspeed, angle = np.moveaxis(forces, 1, 0)
     if truth.effect == "vane_lag":
@@ -207,55 +221,9 @@ def _measured(rng: np.random.Generator, exact: Array, std: float) -> Array:
     return np.asarray(picked + std * rng.standard_normal(picked.size))
 
 
-def _forces(truth: Truth, state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
-    """(5, records) specific forces along x and z, q', airspeed and angle of attack."""
-    u, w, q = state[0] + gust[0], state[1] + gust[1], state[2]
-    airspeed, alpha = np.hypot(u, w), np.arctan2(w, u)
-    if truth.effect == "elevator_effectiveness":
-        elevator = EFFECTS[truth.effect] * elevator
-    if truth.effect == "elevator_fade":
-        elevator = elevator * (1.0 - EFFECTS[truth.effect] * np.abs(elevator))
-    given = np.stack([np.ones_like(alpha), alpha, q * CHORD_M / (2.0 * airspeed), elevator + 0.0 * alpha])
-    lift, moment = np.array(truth.lift) @ given, np.array(truth.moment) @ given
-    if truth.effect == "cm_alpha_nonlinear":
-        moment = moment + EFFECTS[truth.effect] * np.maximum(alpha - BREAK_RAD, 0.0)
-    drag = DRAG[0] + DRAG[1] * lift**2
-    pressure = 0.5 * DENSITY_KG_M3 * airspeed**2 * AREA_M2
-    x = pressure * (lift * np.sin(alpha) - drag * np.cos(alpha)) + thrust
-    z = -pressure * (lift * np.cos(alpha) + drag * np.sin(alpha))
-    turning = pressure * CHORD_M * moment / truth.inertia_kg_m2
-    return np.stack([x / truth.mass_kg, z / truth.mass_kg, turning, airspeed, alpha])
-
-
-def _rates(truth: Truth, state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
-    u, w, q, theta = state[:4]
-    ax, az, q_dot = _forces(truth, state, elevator, thrust, gust)[:3]
-    climb = u * np.sin(theta) - w * np.cos(theta)
-    return np.stack([ax - G0 * np.sin(theta) - q * w, az + G0 * np.cos(theta) + q * u, q_dot, q, climb])
-
-
-def _stepped(truth: Truth, state: Array, elevator: Array, thrust: float, gust: Array) -> Array:
-    """The state after a step of the classical Runge-Kutta method; inputs are linear over it."""
-    middle, between = elevator.mean(axis=1), gust.mean(axis=0)
-    k1 = _rates(truth, state, elevator[:, 0], thrust, gust[0])
-    k2 = _rates(truth, state + 0.5 * STEP_S * k1, middle, thrust, between)
-    k3 = _rates(truth, state + 0.5 * STEP_S * k2, middle, thrust, between)
-    k4 = _rates(truth, state + STEP_S * k3, elevator[:, 1], thrust, gust[1])
-    return np.asarray(state + STEP_S / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
-
-
 def trimmed(truth: Truth = Truth()) -> tuple[float, float, float]:
-    """Angle of attack [rad], elevator [rad] and thrust [N] of level flight, by Newton's method."""
-    x = np.array([0.04, 0.0, 8.0])
-
-    def residual(x: Array) -> Array:
-        state = np.array([AIRSPEED_M_S * np.cos(x[0]), AIRSPEED_M_S * np.sin(x[0]), 0.0, x[0], 0.0])
-        return _rates(truth, state, np.asarray(x[1]), float(x[2]), np.zeros(2))[:3]
-
-    for _ in range(20):
-        jacobian = np.stack([(residual(x + d) - residual(x - d)) / 2e-6 for d in 1e-6 * np.eye(3)], axis=1)
-        x = x - np.linalg.solve(jacobian, residual(x))
-    return float(x[0]), float(x[1]), float(x[2])
+    """Angle of attack [rad], elevator [rad] and thrust [N] of level flight."""
+    return pitch_truth.trimmed(truth.body)
 
 
 def _commands(rng: np.random.Generator, t: Array) -> Array:
@@ -280,22 +248,6 @@ def _servo(command: Array, start: float) -> Array:
         made[:, k] = x
         for _ in range(10):
             x = x + 0.1 * STEP_S * np.clip((command[:, k] - x) / SERVO_S, -RATE_RAD_S, RATE_RAD_S)
-    return made
-
-
-def _gusts(rng: np.random.Generator, steps: int, std: float) -> Array:
-    """(steps, 2, records) gusts along x and z [m/s] of Dryden's spectra (MIL-F-8785C, section 3.7.1.2), by Euler steps."""
-    made = np.zeros((steps, 2, RECORDS))
-    if std == 0.0:
-        return made
-    white = rng.standard_normal((steps + WARM, 2, RECORDS)) / np.sqrt(STEP_S)
-    time_u, time_w = (length / AIRSPEED_M_S for length in GUST_LENGTHS_M)
-    u, x, rate = (np.zeros(RECORDS) for _ in range(3))
-    for k in range(steps + WARM):
-        u = u + STEP_S * (-u / time_u + 1.2 * std * np.sqrt(2.0 / time_u) * white[k, 0])
-        x, rate = x + STEP_S * rate, rate + STEP_S * (-x / time_w**2 - 2.0 * rate / time_w + white[k, 1])
-        if k >= WARM:
-            made[k - WARM] = u, std * time_w**-1.5 * (x + np.sqrt(3.0) * time_w * rate)
     return made
 
 

@@ -14,7 +14,7 @@ class AnswerCriterion:
     ----------
     level : conventional level of significance [-]: of a score after Holm's correction, of what is learned without a name,
         and of a friction of the vane. Also the odds, one in twenty, within which a set explains the records as well as that
-        of the answer, or is refitted.
+        of the answer, or is refitted, and down to which records left out may be less likely with a set than without.
     significant : probability below which an anomaly remains, the records contradict the declared derivatives, and the
         evidence of one name is not weak [-] (judgement: one right answer in a hundred).
     significant_of_several : the last of these where several effects are named [-]: a gain of 25 in 2 log L, because one

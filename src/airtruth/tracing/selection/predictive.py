@@ -295,11 +295,12 @@ def has_converged(own: PosteriorFit, gain: float) -> bool:
 
 
 def _is_loss(gains: Array) -> bool:
-    """Whether the records together lose.
+    """Whether the records together are less likely than without the effect by odds that count.
 
-    One that only the null can follow is a loss, and one that only the effect can follow a gain.
+    Free derivatives predict as well as a cause that explains why they are not as declared, so that a gain by the declaration
+    shows in no record. A record that only the null can follow is a loss, and one that only the effect can follow a gain.
     """
-    return not float(gains.sum()) >= 0.0
+    return not float(gains.sum()) >= np.log(CRITERION.level)
 
 
 __all__ = [
