@@ -4,7 +4,7 @@ import pytest
 
 import airtruth as at
 from airtruth.errors import ConfigurationError
-from airtruth.tracing.selection.budget import Budget, may_begin
+from airtruth.tracing.budget import Budget, may_begin
 
 
 def test_steps_begin_until_the_time_is_over():

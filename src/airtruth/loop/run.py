@@ -21,9 +21,9 @@ from airtruth.loop.result import OUTPUTS, LoopResult
 from airtruth.loop.same_inputs import simulated_logs
 from airtruth.physics.motion import FOLDERS
 from airtruth.tracing import TraceOptions, TraceResult
+from airtruth.tracing.budget import Advance
 from airtruth.tracing.compensate import Compensation, compensated_log, compensation_of, updated_constants
 from airtruth.tracing.motions import MotionTrace, parts_of, traced
-from airtruth.tracing.selection.budget import Advance
 
 METHODS: Final = ("ls", "iv-f1")
 """Methods of a loop by default: least squares, and the default method of `airtruth identify`."""

@@ -20,11 +20,11 @@ from airtruth.logs import atomic
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.motion import FOLDERS, LONGITUDINAL, MOTIONS, Motion
 from airtruth.tracing.answer import ANSWER, TraceAnswer
+from airtruth.tracing.budget import Advance
 from airtruth.tracing.joint import SharedCause, jointly, sentences
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.result import TraceResult
 from airtruth.tracing.run import answered, begun
-from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.update import Revision, write_update
 
 

@@ -22,6 +22,7 @@ from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.answer import ANSWER
 from airtruth.tracing.axial_force import axial_force
+from airtruth.tracing.budget import Advance
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.declared_model import declared_p_value
@@ -35,7 +36,6 @@ from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.replay import flown_again
 from airtruth.tracing.result import TraceResult
 from airtruth.tracing.searched import Searched, searched
-from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import Revision, revision_of, updated_folder, write_update

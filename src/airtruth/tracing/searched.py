@@ -10,6 +10,7 @@ import numpy as np
 from airtruth.checks.result import CheckResult
 from airtruth.effects.effect import Effect
 from airtruth.errors import LogError
+from airtruth.tracing.budget import Advance, Budget, may_begin
 from airtruth.tracing.calibration.calibrated import calibrated
 from airtruth.tracing.calibration.noise_colour import beside, later_level
 from airtruth.tracing.kinematic_start import starts_of, told_by
@@ -17,7 +18,6 @@ from airtruth.tracing.learning.learn import with_increments
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.budget import Advance, Budget, may_begin
 from airtruth.tracing.selection.rounds import SearchRound, scored
 from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.set_table import SetTable

@@ -22,9 +22,8 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
 from airtruth.tracing.learning.increments import Screened
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.selection.candidate import Candidate
+from airtruth.tracing.selection.candidate import Candidate, Refusal
 from airtruth.tracing.selection.predictive import Reference, has_converged, tested_on_left_out
-from airtruth.tracing.selection.refusal import Refusal
 
 Array = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from scipy.special import expit
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import NAME, Increment, Shape
+from airtruth.tracing.budget import Advance, may_begin
 from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.whitening import NO_WHITENER
@@ -21,11 +22,9 @@ from airtruth.tracing.learning.increment_fit import (
     refitted,
 )
 from airtruth.tracing.learning.increments import Screened, screen, shapes, sharpened
-from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.candidate import Candidate
+from airtruth.tracing.selection.candidate import Candidate, Refusal
 from airtruth.tracing.selection.explanation import shares
 from airtruth.tracing.selection.predictive import reference_of
-from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import SearchRound, scored
 from airtruth.tracing.selection.set_table import SetTable
 

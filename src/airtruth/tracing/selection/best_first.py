@@ -17,6 +17,7 @@ import numpy as np
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.anomalies.omnibus import anomalies
+from airtruth.tracing.budget import Advance, may_begin
 from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.hypothesis import Hypothesis
@@ -24,7 +25,6 @@ from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import inflation
 from airtruth.tracing.inference.whitening import autoregression
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.columns import informed
 from airtruth.tracing.selection.expansion import Expansion, expanded
 from airtruth.tracing.selection.explanation import simplest

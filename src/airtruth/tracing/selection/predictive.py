@@ -23,7 +23,7 @@ from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.model.plant import alpha_dot
-from airtruth.tracing.selection.refusal import Refusal
+from airtruth.tracing.selection.candidate import Refusal
 
 Array = NDArray[np.float64]
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.anomalies.score_test import Score
+from airtruth.tracing.budget import Advance
 from airtruth.tracing.inference.causes import DeclaredCauses
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.profile import best_location, location_index, relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.best_first import NOTHING, best_first
-from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.explanation import shares, simplest
 from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior
