@@ -3,7 +3,7 @@
 Quadratics about the declared aircraft, the fit without any effect and the best fit predict the evidence of every set of up to
 three effects. The best set without a refit is refitted from the predicted point, and its own quadratic gives its evidence with
 every explanation of the derivatives. A fit that leads is expanded in turn. The search ends when no set without a refit is
-expected within odds of one in twenty of the best one that passes the tests.
+expected within odds of one in twenty of the best one that records left out do not refuse.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ class _BestFirst:
                 seen.append(fitted)
                 self._predict(fitted)
             following = self._following(best)
-            if following is None and best.is_refitted and not self.is_sound(fitted):
+            if following is None and best.is_refitted and self._is_overfitted(fitted):
                 self._refused.append(fitted)
                 continue
             if following is None or self.refits >= limit:
@@ -162,6 +162,13 @@ class _BestFirst:
         own = self.sets.fit_from_declared(hypothesis, sizes, self.null)
         self.refits += 1
         self._enter(own)
+
+    def _is_overfitted(self, fitted: PosteriorFit) -> bool:
+        """Whether records left out refuse a possible fit: another set may explain them all.
+
+        Impossible sizes show something that the library lacks, which no other set replaces.
+        """
+        return self.is_sound.is_possible(fitted) and not self.is_sound(fitted)
 
     def _is_misfit(self, fitted: PosteriorFit) -> bool:
         """Whether a fit leaves an anomaly beyond doubt."""
@@ -205,7 +212,7 @@ class _BestFirst:
         return True
 
     def _best(self) -> EvaluatedSet:
-        """The most probable set with a refit that no test has refused."""
+        """The most probable set with a refit that records left out have not refused."""
         every = [p for key in self._fits for p in self._of_fit(key)]
         left = [p for p in every if not any(p.expansion.last is fitted for fitted in self._refused)]
         return max(left or every, key=lambda p: p.weighed.log_evidence)

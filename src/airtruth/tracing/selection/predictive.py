@@ -143,18 +143,24 @@ class Soundness:
     def __call__(self, fitted: PosteriorFit) -> bool:
         """Whether a fit has converged to plausible sizes, and is no worse than the null on records left out."""
         if id(fitted) not in self._known:
-            self._known[id(fitted)] = fitted, self._is_sound(fitted)  # the fit lives as long as its number
+            is_sound = self.is_possible(fitted) and self._predicts(fitted)
+            self._known[id(fitted)] = fitted, is_sound  # the fit lives as long as its number
         return self._known[id(fitted)][1]
 
-    def _is_sound(self, fitted: PosteriorFit) -> bool:
-        gain = 2.0 * (self.null.cost - fitted.cost)
-        if not has_converged(fitted, gain):
+    def is_possible(self, fitted: PosteriorFit) -> bool:
+        """Whether a fit has converged to plausible sizes."""
+        if not has_converged(fitted, self._gain(fitted)):
             return False
+        return not fitted.hypothesis.effects or _is_plausible(self.problem, fitted)
+
+    def _predicts(self, fitted: PosteriorFit) -> bool:
         if not fitted.hypothesis.effects:
             return True
-        return _is_plausible(self.problem, fitted) and not (
-            tested_on_left_out(self.problem, fitted, self._reference, gain).reasons
-        )
+        found = tested_on_left_out(self.problem, fitted, self._reference, self._gain(fitted))
+        return not found.reasons
+
+    def _gain(self, fitted: PosteriorFit) -> float:
+        return 2.0 * (self.null.cost - fitted.cost)
 
     @cached_property
     def _reference(self) -> Reference:
