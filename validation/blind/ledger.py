@@ -29,6 +29,7 @@ PRESENT: Final = "page"
 
 GROUPS: Final = {
     PRESENT: "trials",
+    "rules": "trials of the search by rules",
     "further": "further trials",
     "earlier": "earlier versions",
     "delays": "delays and lags alone",
