@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 EDGES: Final = np.linspace(0.0, 1.0, 11)
 """Ends of the classes of weights [-]: deciles."""
+LACKING: Final = ("off-library", "leave-one-out")
+"""Compositions whose effect the library lacks."""
 LEAST: Final = 0.01
 """Least weight of a set that counts [-]."""
 
@@ -52,7 +54,8 @@ def weighed_sets(case: Case) -> Iterator[tuple[float, bool]]:
 
 def is_counted(case: Case) -> bool:
     """Whether the truth is a set that the library can name: none, or effects that are strong."""
-    return not effects(case) or strong(case)
+    is_lacking = case["truth"]["trial"]["composition"] in LACKING
+    return not is_lacking and (not effects(case) or strong(case))
 
 
 def reliability(pairs: Sequence[tuple[float, bool]]) -> list[dict[str, Any]]:
