@@ -1,9 +1,9 @@
-"""Records of a business jet at 10 Hz that a pilot flies by hand: smooth inputs, and instruments of which nothing is declared.
+"""Records of a business jet at 10 Hz: a pilot's smooth inputs, and instruments without a declaration.
 
-    python -m validation.jet_records --seed 1 --trials 4 [--gust 1.0] [--dive 5] [--late]
+    python -m validation.jet_records --seed 1 --trials 4 [--gust 1.0] [--dive 10] [--late]
 
 The truth is that of `validation.pitch_truth`: 5,200 kg at 100 m/s and 3,090 m. The tracer gets an aircraft.toml without a JSBSim
-model, whose values differ from the truth by up to a standard deviation, and no word of a sensor or a servo. Nothing is missing,
+model. Its values differ from the truth by up to a standard deviation, and it declares no sensor and no servo. Nothing is missing,
 or with ``--late`` the channels have the lags of an air data computer and of an attitude reference, more than the library can tell
 apart. With ``--dive 10`` the records begin in dives and climbs, so that the airspeed varies by 11 to 19 %. A trial depends on its
 seed and the options alone.
@@ -57,7 +57,7 @@ NOISE: Final = {
     "elevator_rad": 0.02 * DEG,
     "altitude_m": 0.3,
 }
-LATE: Final = {
+LATE: Final[dict[str, tuple[tuple[float, ...], float]]] = {
     "alpha_rad": ((0.06, 0.06), 0.05),
     "q_rad_s": ((0.03,), 0.0),
     "theta_rad": ((), 0.1),
@@ -65,6 +65,8 @@ LATE: Final = {
     "airspeed_m_s": ((0.3,), 0.0),
 }
 """Channel -> time constants of its lags, and its delay [s]."""
+PROMPT: Final[tuple[tuple[float, ...], float]] = ((), 0.0)
+"""Lags and delay of the other channels."""
 DECLARED: Final = f"""
 schema = 1
 name = "jet"
@@ -125,7 +127,7 @@ def flight_log(seed: int, gust_m_s: float = 1.0, dive_rad: float = 0.0, late: bo
     }
     channels = {}
     for name, x in exact.items():
-        lags, delay_s = LATE.get(name, ((), 0.0)) if late else ((), 0.0)
+        lags, delay_s = LATE.get(name, PROMPT) if late else PROMPT
         read = _read(x, lags, delay_s)[::EVERY].T.ravel()
         channels[name] = np.asarray(read + NOISE[name] * rng.standard_normal(read.size))
     samples = (steps - 1) // EVERY + 1

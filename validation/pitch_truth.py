@@ -1,7 +1,7 @@
-"""A longitudinal truth of its own: a rigid body, lift and moment linear in its signals, a parabolic drag polar and Dryden gusts.
+"""Independent longitudinal simulation: a rigid body, linear lift and moment, a parabolic drag polar and Dryden gusts.
 
-Runge-Kutta steps of 2.5 ms; all records of a flight at once. It shares nothing with the simulation of airtruth or with the model
-of its tracer. `validation.small_aircraft` and `validation.jet_records` fly it.
+The steps are Runge-Kutta steps of 2.5 ms, of all records of a flight at once. It shares nothing with the
+simulation of airtruth or with the model of its tracer. `validation.small_aircraft` and `validation.jet_records` fly it.
 """
 
 from __future__ import annotations

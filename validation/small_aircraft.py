@@ -2,8 +2,8 @@
 
     python -m validation.small_aircraft --seed 1 --trials 10 [--gust 0.35] [--effect elevator_delay] [--drawn]
 
-The truth is that of `validation.pitch_truth` with constant thrust, vertical and horizontal Dryden gusts. The
-tracer gets logs at 50 Hz, or another rate, and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect.
+The truth is that of `validation.pitch_truth` with constant thrust in vertical and horizontal gusts. The tracer gets logs at
+50 Hz, or another rate, and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect.
 The values of the file are those of the truth, or with ``--drawn`` the truth has derivatives, mass and inertia from their declared
 uncertainty. A trial depends on its seed and the options alone.
 """

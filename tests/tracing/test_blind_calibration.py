@@ -10,9 +10,9 @@ def test_a_decile_has_its_mean_weight_and_its_share_of_right_sets():
     """Eight sets of 0.84 of which six are right: Clopper and Pearson give 0.349 to 0.968 (their table of 1934)."""
     pairs = [(0.84, k < 6) for k in range(8)] + [(0.05, False)] * 3
     low, high = reliability(pairs)
-    assert (low["sets"], low["right"], low["to"]) == (3, 0.0, pytest.approx(0.1))
-    assert (high["sets"], high["right"], high["weight"]) == (8, 0.75, pytest.approx(0.84))
-    assert high["interval"] == pytest.approx((0.349, 0.968), abs=1e-3)
+    assert (low.right.count, low.right.value, low.high) == (3, 0.0, pytest.approx(0.1))
+    assert (high.right.count, high.right.value, high.weight) == (8, 0.75, pytest.approx(0.84))
+    assert high.right.interval == pytest.approx((0.349, 0.968), abs=1e-3)
 
 
 def test_calibrated_weights_lie_on_the_diagonal():
@@ -21,7 +21,7 @@ def test_calibrated_weights_lie_on_the_diagonal():
     weights = rng.uniform(0.01, 1.0, 10_000)
     right = rng.uniform(size=weights.size) < weights
     for row in reliability(list(zip(weights.tolist(), right.tolist(), strict=True))):
-        assert row["right"] == pytest.approx(row["weight"], abs=4.0 * 0.5 / np.sqrt(row["sets"]))
+        assert row.right.value == pytest.approx(row.weight, abs=4.0 * 0.5 / np.sqrt(row.right.count))
 
 
 def case(effects, lambdas, alternatives):

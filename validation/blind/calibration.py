@@ -13,18 +13,18 @@ import argparse
 import itertools
 import json
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import binomtest
 
-from validation.blind.scoring import INCREMENT, Case, effects
+from validation.blind.scoring import INCREMENT, Case, Share, effects, share
 from validation.blind.set_scoring import matches, strong
 
-Array = NDArray[np.float64]
+Pairs = Sequence[tuple[float, bool]]
+"""Weight of each set, and whether it is right."""
 
 EDGES: Final = np.linspace(0.0, 1.0, 11)
 """Ends of the classes of weights [-]: deciles."""
@@ -32,6 +32,8 @@ LACKING: Final = ("off-library", "leave-one-out")
 """Compositions whose effect the library lacks."""
 LEAST: Final = 0.01
 """Least weight of a set that counts [-]."""
+LEADING: Final = 0.3
+"""Weight above which the table of the modes counts a set [-]."""
 
 
 def cases_of(folders: Iterable[Path]) -> Iterator[tuple[str, Case]]:
@@ -58,65 +60,62 @@ def is_counted(case: Case) -> bool:
     return not is_lacking and (not effects(case) or strong(case))
 
 
-def reliability(pairs: Sequence[tuple[float, bool]]) -> list[dict[str, Any]]:
-    """Rows of the deciles that have sets: their number, their mean weight, and the share that is right with its 95 % interval.
+@dataclass(frozen=True)
+class Decile:
+    """Sets whose weights are in one class: its ends [-], their mean weight [-], and how many are right."""
+
+    low: float
+    high: float
+    weight: float
+    right: Share
+
+
+def reliability(pairs: Pairs) -> list[Decile]:
+    """The deciles of weights that have sets.
 
     Parameters
     ----------
     pairs : weight of each set, and whether it is right.
     """
-    weights, right = np.array([w for w, _ in pairs]), np.array([r for _, r in pairs], dtype=bool)
-    rows = []
-    for low, high in itertools.pairwise(EDGES):
-        own = (weights > low) & (weights <= high)
-        if own.any():
-            hits, count = int(right[own].sum()), int(own.sum())
-            interval = binomtest(hits, count).proportion_ci(method="exact")
-            rows.append(
-                {
-                    "from": float(low),
-                    "to": float(high),
-                    "sets": count,
-                    "weight": float(weights[own].mean()),
-                    "right": hits / count,
-                    "interval": (float(interval.low), float(interval.high)),
-                }
-            )
-    return rows
+    found = []
+    for low, high in itertools.pairwise(EDGES.tolist()):
+        own = [pair for pair in pairs if low < pair[0] <= high]
+        if own:
+            found.append(Decile(low, high, _mean_weight(own), share(right for _, right in own)))
+    return found
 
 
-def markdown(modes: dict[str, list[tuple[float, bool]]]) -> str:
+def _mean_weight(pairs: Pairs) -> float:
+    return float(np.mean([weight for weight, _ in pairs]))
+
+
+def _row(name: str, weight: float, right: Share) -> str:
+    low, high = right.interval
+    return f"| {name} | {right.count} | {weight:.2f} | {right.value:.2f} ({low:.2f} to {high:.2f}) |"
+
+
+def markdown(modes: Mapping[str, Pairs]) -> str:
     """A table of all modes together, and one of the mean weight and the share that is right in each mode."""
     every = [pair for pairs in modes.values() for pair in pairs]
     lines = ["| weight | sets | mean weight | right (95 % interval) |", "|---|---|---|---|"]
-    for row in reliability(every):
-        low, high = row["interval"]
-        lines.append(
-            f"| {row['from']:.1f} to {row['to']:.1f} | {row['sets']} | {row['weight']:.2f} | {row['right']:.2f} "
-            f"({low:.2f} to {high:.2f}) |"
-        )
+    lines += [_row(f"{d.low:.1f} to {d.high:.1f}", d.weight, d.right) for d in reliability(every)]
     lines += ["", "| mode | sets above 0.3 | mean weight | right (95 % interval) |", "|---|---|---|---|"]
     for mode, pairs in sorted(modes.items()):
-        top = [(w, r) for w, r in pairs if w > 0.3]
+        top = [pair for pair in pairs if pair[0] > LEADING]
         if top:
-            hits = sum(r for _, r in top)
-            interval = binomtest(hits, len(top)).proportion_ci(method="exact")
-            lines.append(
-                f"| {mode} | {len(top)} | {np.mean([w for w, _ in top]):.2f} | {hits / len(top):.2f} "
-                f"({interval.low:.2f} to {interval.high:.2f}) |"
-            )
+            lines.append(_row(mode, _mean_weight(top), share(right for _, right in top)))
     return "\n".join(lines) + "\n"
 
 
-def draw(modes: dict[str, list[tuple[float, bool]]], file: Path) -> None:
+def draw(modes: Mapping[str, Pairs], file: Path) -> None:
     """Share of right sets over their weight, with 95 % intervals."""
     from airtruth import style
 
     figure = style.new_figure(4.2, 3.6)
     axes = figure.subplots()
-    rows = reliability([pair for pairs in modes.values() for pair in pairs])
-    weight, right = np.array([r["weight"] for r in rows]), np.array([r["right"] for r in rows])
-    ends = np.array([r["interval"] for r in rows]).T
+    deciles = reliability([pair for pairs in modes.values() for pair in pairs])
+    weight, right = np.array([d.weight for d in deciles]), np.array([d.right.value for d in deciles])
+    ends = np.array([d.right.interval for d in deciles]).T
     axes.plot([0.0, 1.0], [0.0, 1.0], linewidth=0.8, color="0.6")
     axes.errorbar(weight, right, yerr=np.abs(ends - right), fmt="o", capsize=2.0)
     axes.set_xlabel("posterior weight of a set [-]")

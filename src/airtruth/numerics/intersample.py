@@ -46,7 +46,7 @@ _STILL: Final = 0.005
 """The same over the largest increment [-]; judgement, for a surface without noise."""
 _EXPLAINS: Final = 0.7
 """Moving cells with the decay of a servo over those of the surface itself below which it shows one [-]; judgement: held commands
-give 0.03 to 0.61, and smooth inputs of a pilot 0.75 or more. Of a servo that settles within the cell they give 1 - rho."""
+give 0.03 to 0.61, and smooth inputs of a pilot 0.75 or more. For a fast servo the limit is 1 - rho."""
 _AGREEING: Final = 0.5
 """Least lower quartile of the ratios over their median that shows a servo [-]; judgement."""
 _SURE: Final = 3.0
@@ -66,7 +66,7 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
     """Decay rho of a servo over a sample period, by neighbouring increments of the surface.
 
     It is the weighted median of their ratio, or a lower quantile with which the command moves in far fewer cells. The command has
-    to move in far fewer cells than the surface: smooth inputs of a pilot have ratios of their own.
+    to move in far fewer cells than the surface, because increments of a pilot's smooth inputs have such ratios too.
 
     A step within a cell gives ratios above that of the servo. The median is among them where the servo settles within two or
     three samples. A declared decay of such a servo is taken, unless the command moves in far fewer cells with another one. A

@@ -35,8 +35,8 @@ def _least_ratio(samples: int) -> float:
 def noise_at_rest(x: NDArray[np.float64], samples: int) -> float:
     """Standard deviation of the white noise of a signal where it rests, in its unit; 0 where it shows none.
 
-    Windows of rest are those of least variance. A signal that keeps its value in one of them has no noise, and one whose ratio of
-    all of them is not that of white noise moves.
+    Windows of rest are those of least variance. The signal has no noise if it is constant in one of them. It moves if von
+    Neumann's ratio of all of them together is below that of white noise.
 
     Parameters
     ----------

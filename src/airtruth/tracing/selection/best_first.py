@@ -212,10 +212,10 @@ class _BestFirst:
         return True
 
     def _best(self) -> EvaluatedSet:
-        """The most probable set with a refit that records left out have not refused."""
+        """The most probable set whose refit records left out have not refused, as they never refuse the null."""
         every = [p for key in self._fits for p in self._of_fit(key)]
         left = [p for p in every if not any(p.expansion.last is fitted for fitted in self._refused)]
-        return max(left or every, key=lambda p: p.weighed.log_evidence)
+        return max(left, key=lambda p: p.weighed.log_evidence)
 
     def _of_fit(self, key: frozenset[str]) -> list[EvaluatedSet]:
         """The sets with some effects of the filter that their fits weigh: with each explanation of the derivatives."""
