@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from airtruth.checks.result import Finding
@@ -14,8 +15,8 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.kinematic_start import (
     disagreement,
     kinematic_check,
+    likelihood_of,
     starts_of,
-    told_by,
     with_contradictions,
     within_kinematics,
 )
@@ -65,6 +66,56 @@ def test_a_check_shows_a_slow_vane(logs, gtm):
 def test_held_out_records_take_no_part(logs, gtm):
     last = logs[-1].run_ids[-1]
     assert last not in kinematic_check(logs, gtm, held={last}).run_ids
+
+
+@pytest.mark.slow
+def test_the_likelihood_of_the_kinematics_is_that_of_the_check(logs, gtm):
+    """Its value at the check's own sets is the difference of their statistics, and its slope that of its value."""
+    check = kinematic_check(logs, gtm, held=())
+    told = likelihood_of(check)
+    none = next(e.fit for e in check.search.tried if not e.fit.names)
+    for one in check.search.tried[:6]:
+        if set(one.fit.names) <= told.names:
+            effects = [EFFECTS[name] for name in one.fit.names]
+            sizes = np.array([e.parameters[0].size(v) for e, v in zip(effects, one.fit.value, strict=True)])
+            expected = 0.5 * (one.fit.statistic - none.statistic) / check.search.enlargement
+            assert told.terms(effects, sizes).value == pytest.approx(expected, rel=1e-9)
+    effects = [EFFECTS["vane_lag"], EFFECTS["elevator_delay"], EFFECTS["gyro_scale"]]
+    at, step = np.array([0.15, 0.02, 0.01]), 1e-6
+    terms = told.terms(effects, at)
+    for k in (0, 2):
+        moved = [told.terms(effects, at + sign * step * np.eye(3)[k]).value for sign in (-1.0, 1.0)]
+        assert terms.slope[k] == pytest.approx((moved[1] - moved[0]) / (2.0 * step), rel=0.02)
+    # Gauss-Newton: the outer product of the derivatives is symmetric, and a delay of the elevator is no error of a sensor
+    assert terms.slope[1] == 0.0
+    assert not terms.information[1].any()
+    assert terms.information == pytest.approx(terms.information.T)
+
+
+@pytest.mark.slow
+def test_a_size_multiplies_a_declared_factor(logs, gtm):
+    """The vane is declared with a scale of 1.1: a size of -0.1 is an error of 0.99."""
+    file = gtm.file
+    vane = file.sensors["alpha_rad"].model_copy(update={"scale": 1.1})
+    declared = gtm.model_copy(
+        update={"file": file.model_copy(update={"sensors": file.sensors | {"alpha_rad": vane}})}
+    )
+    told = likelihood_of(kinematic_check(logs, declared, held=()))
+    problem, size = told.search.problem, np.array([-0.1])
+    others = {
+        n: v
+        for n, v in zip(told.search.best.fit.names, told.search.best.fit.value, strict=True)
+        if n not in told.names
+    }
+    at, none = (problem.moments({**others, **more}) for more in ({"vane_scale": 0.99}, {}))
+    expected = 0.5 * (at @ at - none @ none) / told.search.enlargement
+    assert told.terms([EFFECTS["vane_scale"]], size).value == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_check_that_failed_tells_nothing():
+    check = airspeed_check("present")
+    check.search, check.verdict = object(), "failed"
+    assert likelihood_of(check) is likelihood_of(None) is None
 
 
 @pytest.mark.long
@@ -138,18 +189,6 @@ def test_alternatives_of_a_check_are_sets_and_its_airspeed_belongs_to_each():
     )
     check.verdict = "failed"
     assert starts_of(check, 0.02) == starts_of(None, 0.02) == ()
-
-
-def test_an_error_that_every_set_of_a_check_holds_is_told():
-    """With its own standard deviation; one that a set does without, and the airspeed, are not told."""
-    check = airspeed_check("present")
-    arm, scale, other = map(error, ("vane_arm:beta_rad", "gyro_scale:r_rad_s", "vane_scale:beta_rad"))
-    check.possible = tuple(SimpleNamespace(errors=(arm, beside)) for beside in (scale, other))
-    names = ("vane_arm:beta_rad", "gyro_scale:r_rad_s", "vane_scale:beta_rad")
-    check.findings += tuple(Finding(n, "m", "", 13.4, 0.4, 12.6, 14.2, 0.0, 1.0, "present") for n in names)
-    assert told_by(check, 0.02) == {"vane_arm:beta_rad": (13.4, 0.4)}
-    check.verdict = "failed"
-    assert told_by(check, 0.02) == told_by(None, 0.02) == {}
 
 
 @pytest.mark.parametrize(("lag_s", "names"), [(0.0099, ()), (0.0101, ({"vane_lag": 0.0101},))])

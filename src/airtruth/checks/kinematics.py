@@ -152,6 +152,7 @@ def check_kinematics(
         enlargement=found.enlargement,
         residual_rms=rms(found.problem, found.best.fit),
         sentences=(*words, *remarks),
+        search=found,
     )
 
 

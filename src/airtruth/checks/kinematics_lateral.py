@@ -102,6 +102,7 @@ def check_lateral(
         enlargement=shown.enlargement,
         residual_rms=rms(found.problem, found.best.fit),
         sentences=(*words, *remarks),
+        search=found,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -17,6 +17,8 @@ from airtruth.table import WIDTH, Cell, Table, as_text, flat
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+    from airtruth.checks.kinematics_search import ErrorSearch
 
 Verdict = Literal["agrees", "errors", "one_of", "cannot_tell", "failed"]
 """Answers of a check: the channels agree; errors of sensors are present; one of several sets of errors is; the
@@ -89,6 +91,7 @@ class CheckResult:
     residual_rms : channel -> rms of the unexplained remainder: moving air and noise [unit of the channel].
     sentences : conclusions, ambiguities and missing channels in words, the conclusion first.
     forced : faults of the log that the gate found and ``force`` overruled.
+    search : comparison of the sets of errors; None where there was none.
     """
 
     verdict: Verdict
@@ -102,6 +105,7 @@ class CheckResult:
     residual_rms: Mapping[str, float]
     sentences: tuple[str, ...]
     forced: tuple[str, ...] = ()
+    search: ErrorSearch | None = field(default=None, repr=False, compare=False)
 
     @property
     def possible(self) -> tuple[PossibleCause, ...]:
@@ -133,7 +137,9 @@ class CheckResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
-        return asdict(self)
+        stated = asdict(replace(self, search=None))
+        del stated["search"]
+        return stated
 
     @style.themed
     def plot(self) -> Figure:

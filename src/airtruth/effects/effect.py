@@ -54,7 +54,6 @@ class Parameter:
         accept it.
     spans : largest size in wing spans of a real aircraft; a trace accepts no larger one.
     prior_std, prior_mean : of a normal prior of the size; an infinite standard deviation for none.
-    prior_weight : number of times that this prior counts in a fit, whose likelihood is not divided by its ratio of variances.
     scales_with : derivative with which ``material`` scales, which is that of the GTM; empty for none.
     """
 
@@ -75,7 +74,6 @@ class Parameter:
     spans: float = math.inf
     prior_std: float = math.inf
     prior_mean: float = 0.0
-    prior_weight: float = 1.0
     scales_with: str = ""
 
     def for_aircraft(self, derivatives: Mapping[str, float]) -> Parameter:

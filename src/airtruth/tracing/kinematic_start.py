@@ -28,6 +28,7 @@ from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import Evidence, TraceAnswer
 from airtruth.tracing.criterion import CRITERION
+from airtruth.tracing.inference.kinematic_likelihood import KinematicLikelihood
 
 ERRORS: Final = kinematics_model.ERRORS | kinematics_side.ERRORS
 """Errors that the kinematics of a motion can show, by name."""
@@ -95,20 +96,15 @@ def starts_of(check: CheckResult | None, dt_s: float) -> tuple[dict[str, float],
     return tuple({name: values[name] for name in sorted(one)} for one in sets if one)
 
 
-def told_by(check: CheckResult | None, dt_s: float) -> dict[str, tuple[float, float]]:
-    """Effects that every set of a check holds, as key -> value beyond the declared one and standard deviation [SI].
+def likelihood_of(check: CheckResult | None) -> KinematicLikelihood | None:
+    """The likelihood of the errors of sensors that a check compares; None where it cannot judge them.
 
     The airspeed is left out: `within_kinematics` has what its equation tells.
-
-    Parameters
-    ----------
-    dt_s : as of `starts_of`.
     """
-    if check is None or check.verdict not in ("errors", "one_of") or not check.possible:
-        return {}
-    needed = set.intersection(*(_effects_of(cause, dt_s) for cause in check.possible))
-    found = (f for f in check.findings if f.name in needed)
-    return {f.name: (_beyond_declared(f), f.std) for f in found if f.name not in AIRSPEED}
+    if check is None or check.search is None or check.verdict == "failed":
+        return None
+    names = {f.name for f in check.findings if f.name in ERRORS and f.name in EFFECTS}
+    return KinematicLikelihood(check.search, frozenset(names - {*AIRSPEED}))
 
 
 def _effects_of(cause: PossibleCause, dt_s: float) -> set[str]:
@@ -239,8 +235,8 @@ def _key(name: str, channel: str | None) -> str:
 __all__ = [
     "disagreement",
     "kinematic_check",
+    "likelihood_of",
     "starts_of",
-    "told_by",
     "with_contradictions",
     "within_kinematics",
 ]

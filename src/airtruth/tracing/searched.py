@@ -13,7 +13,7 @@ from airtruth.errors import LogError
 from airtruth.tracing.budget import Advance, Budget, may_begin
 from airtruth.tracing.calibration.calibrated import calibrated
 from airtruth.tracing.calibration.noise_colour import beside, later_level
-from airtruth.tracing.kinematic_start import starts_of, told_by
+from airtruth.tracing.kinematic_start import likelihood_of, starts_of
 from airtruth.tracing.learning.learn import with_increments
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.options import TraceOptions
@@ -57,8 +57,7 @@ class Searched:
         required : keys of effects that the set has to hold.
         """
         case = replace(self.case, effects=tuple(effects.get(e.key, e) for e in self.case.effects))
-        again = replace(self, case=case)
-        return replace(again, rounds=_rounds(again, required) or self.rounds)
+        return _with_rounds(replace(self, case=case), required)
 
     def refitted(self, effects: Mapping[str, Effect]) -> Searched:
         """The same rounds, with the last fit made again for effects in the place of those of their keys."""
@@ -99,8 +98,9 @@ def searched(case: Case, options: TraceOptions, advance: Advance, kinematics: Ch
     advance("refit the declared aircraft")
     limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
     case, start = calibrated(case)
+    case = replace(case, fitted=replace(case.fitted, kinematics=likelihood_of(kinematics)))
     own = Searched(case, SetTable(case.fitted), (), start, kinematics, options, limited or advance)
-    own = replace(own, rounds=_rounds(own))
+    own = _with_rounds(own)
     if not own.rounds:
         raise LogError(
             f"the declared aircraft {case.fitted.records[0].plant.aircraft.name} does not fly like these records: its "
@@ -111,10 +111,10 @@ def searched(case: Case, options: TraceOptions, advance: Advance, kinematics: Ch
     return own
 
 
-def _rounds(own: Searched, required: Collection[str] = ()) -> tuple[SearchRound, ...]:
-    """The rounds of a search."""
+def _with_rounds(own: Searched, required: Collection[str] = ()) -> Searched:
+    """A search with its rounds, or with those that it had where no set can be fitted."""
     case = own.case
-    return search(
+    rounds = search(
         own.sets,
         case.hypothesis,
         own.start,
@@ -124,8 +124,8 @@ def _rounds(own: Searched, required: Collection[str] = ()) -> tuple[SearchRound,
         own.advance,
         required,
         starts_of(own.kinematics, own.longest_period_s),
-        told_by(own.kinematics, own.longest_period_s),
     )
+    return replace(own, case=replace(case, fitted=own.sets.problem), rounds=rounds or own.rounds)
 
 
 def _with_later_colour(own: Searched) -> Searched:
@@ -141,7 +141,7 @@ def _with_later_colour(own: Searched) -> Searched:
         return own
     start = replace(point, sizes=np.empty(0))
     slow = replace(own, case=coloured, sets=SetTable(coloured.fitted), start=start)
-    slow = replace(slow, rounds=_rounds(slow))
+    slow = _with_rounds(slow)
     return slow if slow.rounds and _cost(slow) < _cost(own) else own
 
 

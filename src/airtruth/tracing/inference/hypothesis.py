@@ -119,14 +119,9 @@ class Hypothesis:
 
     @cached_property
     def size_precision(self) -> Array:
-        """(sizes,) precision of the normal prior of each size as a fit counts it; zero for none."""
+        """(sizes,) precision of the normal prior of each size; zero for none."""
         every = (self.parameter(k) for k in range(len(self.parameters)))
-        return np.array([p.prior_weight * p.prior_std**-2.0 for p in every])
-
-    @cached_property
-    def prior_weights(self) -> Array:
-        """(sizes,) number of times that a fit counts the prior of each size."""
-        return np.array([self.parameter(k).prior_weight for k in range(len(self.parameters))])
+        return np.array([p.prior_std**-2.0 for p in every])
 
     @cached_property
     def size_pull(self) -> Array:

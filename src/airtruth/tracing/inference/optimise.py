@@ -240,7 +240,7 @@ def fit(
         likelihood=np.array([t.cost for t in at.terms]),
         sensitivities=at.sensitivities,
         whitener=whitener,
-        covariance=_covariance(search, at),
+        covariance=_covariance(search, at, start.of_vector(x)),
         converged=converged,
         shortfall=0.0 if converged else search.shortfall(x, at),
         outrun=status is SolverStatus.OUTRUN,
@@ -291,17 +291,10 @@ def _without_effects(
     return known.sensitivities
 
 
-def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
+def _covariance(search: PosteriorSearch, at: Evaluated, point: Parameters) -> Array:
     """Inverse of the marginal information."""
-    priors = search.priors
-    empty = Parameters(
-        np.zeros(search.shape.of.common.size),
-        np.stack([mean for mean, _ in priors.per_record]),
-        np.zeros(len(search.hypothesis.parameters)),
-        search.shape.of,
-    )
-    fixed = tuple(empty.layout.size(k) for k in search.hypothesis.fixed)
-    marginal = marginal_information(priors, empty, at.terms, levels=search.levels, fixed=fixed)
+    fixed = tuple(point.layout.size(k) for k in search.hypothesis.fixed)
+    marginal = marginal_information(search.priors, point, at.terms, levels=search.levels, fixed=fixed)
     return scaled_inverse(marginal.information, _RIDGE)
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from airtruth.physics.terms import DECLARED
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.kinematic_likelihood import KinematicLikelihood
 from airtruth.tracing.inference.sensitivities import InnovationDerivatives, Sensitivities
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.parameters import Layout, ParameterLayout, Parameters
@@ -42,6 +43,36 @@ _LOCATION_STEP: Final = 0.02
 parameter is a location [-]; judgement: as of `Entry`."""
 
 
+class LikelihoodTerms(NamedTuple):
+    """Negative log-likelihood of one record, its gradient (parameters,) and Fisher information."""
+
+    cost: float
+    gradient: Array
+    information: Array
+
+
+@dataclass(frozen=True)
+class KinematicPrior:
+    """The likelihood of the kinematics for the effects of a hypothesis.
+
+    Attributes
+    ----------
+    likelihood : of the fitted records; hypothesis : whose effects it tells of.
+    """
+
+    likelihood: KinematicLikelihood
+    hypothesis: Hypothesis
+
+    def terms(self, sizes: Array) -> LikelihoodTerms:
+        """Value, gradient (sizes,) and information (sizes, sizes), as many times as a fit counts them."""
+        effects, weight = self.hypothesis.effects, self.likelihood.weight
+        rows = [self.hypothesis.span(e.key).start for e in effects]
+        value, slope, information = self.likelihood.terms(effects, sizes[rows])
+        gradient, total = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
+        gradient[rows], total[np.ix_(rows, rows)] = weight * slope, weight * information
+        return LikelihoodTerms(weight * value, gradient, total)
+
+
 class Priors(NamedTuple):
     """Normal priors of a hypothesis.
 
@@ -50,28 +81,34 @@ class Priors(NamedTuple):
     common : (common, common) precision of the common parameters about zero.
     sizes, pull : (sizes,) precision of each size, and precision times mean.
     per_record : mean (per-record,) and precision (per-record, per-record) of each record.
+    kinematics : what the kinematics tells of the sizes; None for nothing.
     """
 
     common: Array
     sizes: Array
     pull: Array
     per_record: tuple[tuple[Array, Array], ...]
+    kinematics: KinematicPrior | None = None
 
 
 @dataclass(frozen=True)
 class TraceProblem:
-    """Records, what is declared of their sensors, and how many threads work on them."""
+    """Records, what is declared of their sensors, how many threads work on them, and what their kinematics tells."""
 
     records: tuple[TraceRecord, ...]
     settings: Settings
     threads: int = 1
+    kinematics: KinematicLikelihood | None = None
 
     def priors(self, hypothesis: Hypothesis) -> Priors:
         """Priors of a hypothesis; each record's own is that of its flight condition."""
         free = hypothesis.unconstrained
         own = tuple(per_record_prior(r, self.settings, free) for r in self.records)
         common = common_prior(self.records, self.settings, free, hypothesis.spread)
-        return Priors(common, hypothesis.size_precision, hypothesis.size_pull, own)
+        told = self.kinematics
+        is_shown = told is not None and told.weight > 0.0 and told.shows([e.key for e in hypothesis.effects])
+        kinematics = KinematicPrior(told, hypothesis) if told is not None and is_shown else None
+        return Priors(common, hypothesis.size_precision, hypothesis.size_pull, own, kinematics)
 
     @property
     def layout(self) -> ParameterLayout:
@@ -99,14 +136,6 @@ class TraceProblem:
             return [function(a) for a in arguments]
         with ThreadPoolExecutor(self.threads) as pool:
             return list(pool.map(function, arguments))
-
-
-class LikelihoodTerms(NamedTuple):
-    """Negative log-likelihood of one record, its gradient (parameters,) and Fisher information."""
-
-    cost: float
-    gradient: Array
-    information: Array
 
 
 @dataclass(frozen=True)
@@ -267,6 +296,8 @@ def prior_cost(priors: Priors, point: Parameters) -> float:
     """Negative logarithm of the prior density, without constants; that of a size is zero where its effect is absent."""
     total = 0.5 * float(point.common @ priors.common @ point.common + priors.sizes @ point.sizes**2)
     total -= float(priors.pull @ point.sizes)
+    if priors.kinematics is not None:
+        total += priors.kinematics.terms(point.sizes).cost
     for (mean, precision), own in zip(priors.per_record, point.per_record, strict=True):
         off = own - mean
         total += 0.5 * float(off @ precision @ off)
@@ -321,6 +352,10 @@ def marginal_information(
     sizes = np.arange(len(priors.sizes)) + common.stop
     information[sizes, sizes] = priors.sizes
     gradient[sizes] = priors.sizes * point.sizes - priors.pull
+    if priors.kinematics is not None:
+        told = priors.kinematics.terms(point.sizes)
+        gradient[sizes] += told.gradient
+        information[np.ix_(sizes, sizes)] += told.information
     eliminated = []
     level = of.per_record.log_gust
     for (mean, precision), values, (_, g, h) in zip(priors.per_record, point.per_record, terms, strict=True):

@@ -110,7 +110,13 @@ def _without_own(marginal: slice, slopes: Array, own: Array, mixed: Array) -> tu
 def _prior_information(problem: TraceProblem, fitted: PosteriorFit) -> Array:
     """Variance of the slopes of the priors on common parameters and sizes."""
     priors = problem.priors(fitted.hypothesis)
-    return np.asarray(block_diag(priors.common, np.diag(priors.sizes * fitted.hypothesis.prior_weights)))
+    sizes = np.diag(priors.sizes)
+    if (
+        priors.kinematics is not None
+    ):  # a slope that counts several times varies with the square of their number
+        told = priors.kinematics
+        sizes += told.likelihood.weight * told.terms(fitted.point.sizes).information
+    return np.asarray(block_diag(priors.common, sizes))
 
 
 def robust_covariance(problem: TraceProblem, fitted: PosteriorFit) -> Array:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -25,12 +24,11 @@ from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import inflation
 from airtruth.tracing.inference.whitening import autoregression
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.columns import informed
 from airtruth.tracing.selection.expansion import Expansion, expanded
 from airtruth.tracing.selection.explanation import simplest
 from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior, normalised
 from airtruth.tracing.selection.predictive import Soundness
-from airtruth.tracing.selection.set_table import SetTable
+from airtruth.tracing.selection.set_table import SAME, SetTable
 
 REFITS: Final = 30
 """Largest number of refits [-] (judgement: ten to forty seconds)."""
@@ -39,12 +37,8 @@ MOST_EFFECTS: Final = 3
 _HELD: Final = 1e-4
 """Variance of derivatives that are held as they are declared, over the declared one [-] (judgement: a hundredth of a standard
 deviation)."""
-NOTHING: Final[Mapping[str, tuple[float, float]]] = MappingProxyType({})
-"""The kinematics tells of no error."""
 _SCALE: Final = 2.0
 """Largest gain over the predicted one that is allowed for [-] (judgement: a quadratic that errs by more tells nothing)."""
-_SAME: Final = 0.05
-"""Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 
 
 def best_first(
@@ -55,7 +49,6 @@ def best_first(
     declared: DeclaredCauses,
     advance: Advance = lambda step: None,
     known: Sequence[Mapping[str, float]] = (),
-    told: Mapping[str, tuple[float, float]] = NOTHING,
 ) -> Posterior | None:
     """Posterior probabilities of the sets of effects; None where not even the declared aircraft can be fitted.
 
@@ -65,13 +58,12 @@ def best_first(
     effects : candidates of the filter; declared : what else changes the derivatives.
     advance : receives the step that begins, or holds the time budget.
     known : sets of effects at which the search begins too: key -> value of the first parameter in its unit.
-    told : what the kinematics alone tells: key -> value of the first parameter and its standard deviation in its unit.
     """
     null = sets.converged(hypothesis, start)
     if null is None:
         return None
     free = tuple(e for e in effects if e.parameters[0].low < e.parameters[0].high)
-    return _BestFirst(sets, null, free, declared, advance).run(known, told)
+    return _BestFirst(sets, null, free, declared, advance).run(known)
 
 
 class _BestFirst:
@@ -101,18 +93,14 @@ class _BestFirst:
         self._refused: list[PosteriorFit] = []
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
 
-    def run(self, known: Sequence[Mapping[str, float]], told: Mapping[str, tuple[float, float]]) -> Posterior:
+    def run(self, known: Sequence[Mapping[str, float]]) -> Posterior:
         """Refit set after set until no other one can come within the odds."""
         null = self.null
-        alone = self._fits[frozenset()] = [expanded(self.sets.problem, null)]
+        self._fits[frozenset()] = [expanded(self.sets.problem, null)]
         for sizes in known:
             self._begin_at(sizes)
         self._tempered(self._best().expansion.last)
-        if told and self.temper > 1.0 + _SAME:
-            self.effects = tuple(informed(e, told.get(e.key), self.temper) for e in self.effects)
-            self._fits = {frozenset(): alone}
-            for sizes in known:
-                self._begin_at(sizes)
+        self._recounted()
         as_declared = self._as_declared()
         if as_declared is not None:
             self._expansions.append(expanded(self.sets.problem, as_declared, self.effects))
@@ -135,6 +123,8 @@ class _BestFirst:
             if following is None and best.is_refitted and self._is_overfitted(fitted):
                 self._refused.append(fitted)
                 continue
+            if following is None and self._recounted():
+                continue
             if following is None or self.refits >= limit:
                 if swept or not self._is_misfit(fitted):
                     break
@@ -151,6 +141,27 @@ class _BestFirst:
             for key, every in self._fits.items()
         }
         return Posterior(normalised(logs), evaluated, fits, null, self.refits, self.temper, self.is_sound)
+
+    def _recounted(self) -> bool:
+        """Count the kinematics beside the present ratio of variances; whether fits were made again for it."""
+        if not self.sets.count_kinematics(self.temper):
+            return False
+        told = self.sets.problem.kinematics
+        least = self._best().weighed.log_evidence + float(np.log(CRITERION.level))
+        changed = [
+            key
+            for key in self._fits
+            if told is not None
+            and told.shows(key)
+            and max(p.weighed.log_evidence for p in self._of_fit(key)) > least
+        ]
+        for key in changed:
+            for expansion in self._fits.pop(key):
+                last = expansion.last
+                self._enter(self.sets.converged(last.hypothesis, last.point, near=last))
+                self.refits += 1
+        self._predicted = self._predictions()
+        return bool(changed)
 
     def _begin_at(self, known: Mapping[str, float]) -> None:
         """Refit a set from the declared aircraft at known values."""
@@ -205,7 +216,7 @@ class _BestFirst:
         layout = fitted.layout
         rows = np.r_[layout.of.common.derivatives, layout.sizes]
         temper = float(np.mean(ratio[rows] ** 2))
-        if abs(np.log(temper / self.temper)) < _SAME:
+        if abs(np.log(temper / self.temper)) < SAME:
             return False
         self.temper = temper
         self._predicted = self._predictions()
@@ -390,4 +401,4 @@ class _BestFirst:
         return logs, evaluated
 
 
-__all__ = ["NOTHING", "best_first"]
+__all__ = ["best_first"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -126,21 +126,4 @@ def _size_prior(c: EffectColumn) -> tuple[float, float, float, float, float, flo
     return (-float(np.log(sides * np.log(end / least))), 1.0, -end if low >= 0.0 else low, high, least, sign)
 
 
-def informed(effect: Effect, told: tuple[float, float] | None, temper: float) -> Effect:
-    """An effect with what the kinematics tells of its size.
-
-    The likelihood of the filter holds the kinematics too, but divided by the ratio of variances. What the kinematics tells alone,
-    without any error of the aerodynamic model, has the share of the information that this leaves out.
-    """
-    first = effect.parameters[0]
-    if told is None or first.reciprocal or len(effect.parameters) > 1:
-        return effect
-    value, std = told
-    share = 1.0 - 1.0 / temper
-    own = replace(
-        first, prior_mean=first.size(value), prior_std=std / float(np.sqrt(share)), prior_weight=temper
-    )
-    return replace(effect, parameters=(own,))
-
-
-__all__ = ["EffectColumn", "SizePriors", "informed", "size_priors"]
+__all__ = ["EffectColumn", "SizePriors", "size_priors"]

@@ -16,6 +16,7 @@ from airtruth.tracing.anomalies.score_test import LOCATIONS, beside
 from airtruth.tracing.inference.causes import Cause
 from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.hypothesis import unconstrained_by
+from airtruth.tracing.inference.kinematic_likelihood import KinematicTerms
 from airtruth.tracing.inference.posterior import (
     Marginal,
     PosteriorFit,
@@ -45,6 +46,7 @@ class Expansion:
     last : the fit; marginal : gradient and information of common parameters, sizes, and one direction for each further effect.
     effects, columns, at : (effects,) those of the fit and the further ones, where their first size is, and its value there.
     locations : of each effect, its parameters after the size; tried : the number of locations that were compared.
+    told : what the kinematics tells of the effects at these sizes; counted : number of times that ``marginal`` counts it.
     """
 
     last: PosteriorFit
@@ -54,6 +56,8 @@ class Expansion:
     at: Array
     locations: tuple[Array, ...]
     tried: tuple[int, ...]
+    told: KinematicTerms | None = None
+    counted: float = 0.0
 
     def point(self, chosen: Sequence[int], sizes: Array, common: Mapping[int, float] = _FREE) -> Parameters:
         """Parameters where the quadratic is least with these effects alone.
@@ -104,13 +108,18 @@ class Expansion:
         gradient, information = self.marginal.gradient.copy(), self.marginal.information.copy()
         gradient[declared] -= precision @ at
         information[np.ix_(declared, declared)] -= precision
-        told, pull, sizes = hypothesis.size_precision, hypothesis.size_pull, last.point.sizes
+        known, pull, sizes = hypothesis.size_precision, hypothesis.size_pull, last.point.sizes
         rows = np.arange(len(sizes)) + last.layout.sizes.start
-        gradient[rows] -= told * sizes - pull
-        information[rows, rows] -= told
+        gradient[rows] -= known * sizes - pull
+        information[rows, rows] -= known
+        stated = 0.5 * float(at @ precision @ at + known @ sizes**2) - float(pull @ sizes)
+        if self.told is not None:
+            more = temper - 1.0 - self.counted
+            gradient[self.columns] += more * self.told.slope
+            information[np.ix_(self.columns, self.columns)] += more * self.told.information
+            stated -= more * self.told.value
         g, h = eliminated(gradient, information, [*declared, *self.columns.tolist()])
         x = np.concatenate([at, self.at])
-        stated = 0.5 * float(at @ precision @ at + told @ sizes**2) - float(pull @ sizes)
         offset = last.cost - stated - float(g @ x) + 0.5 * float(x @ h @ x)
         along = np.zeros((len(x), len(causes)))
         for k, cause in enumerate(causes):
@@ -155,7 +164,11 @@ def expanded(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect
     _, by_effect, tried, sensitivities = beside(last, problem, lacking)
     terms = [likelihood_terms(s, NO_WHITENER, levels=True) for s in sensitivities]
     marginal = marginal_information(
-        problem.priors(last.hypothesis), last.point, terms, levels=True, fixed=last.point.at_bounds
+        problem.priors(last.hypothesis)._replace(kinematics=None),
+        last.point,
+        terms,
+        levels=True,
+        fixed=last.point.at_bounds,
     )
     own_columns = [last.layout.size(last.hypothesis.span(e.key).start) for e in members]
     first = len(marginal.gradient) - len(tried)
@@ -173,18 +186,29 @@ def expanded(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect
             counts.append(len(own))
     kept = [*range(first), *(first + i for i in best)]
     sizes = [last.point.sizes[last.hypothesis.span(e.key)] for e in members]
+    compared = (*members, *(tried[i].effect for i in best))
+    columns = np.array([*own_columns, *range(first, first + len(best))], dtype=np.int64)
+    at_sizes = np.array([*(float(s[0]) for s in sizes), *(0.0 for _ in best)])
+    gradient, information = marginal.gradient[kept], marginal.information[np.ix_(kept, kept)]
+    told, counted = None, 0.0
+    if problem.kinematics is not None:
+        told, counted = problem.kinematics.terms(compared, at_sizes), problem.kinematics.weight
+        gradient[columns] += counted * told.slope
+        information[np.ix_(columns, columns)] += counted * told.information
     return Expansion(
         last,
         Marginal(
-            marginal.gradient[kept],
-            marginal.information[np.ix_(kept, kept)],
+            gradient,
+            information,
             tuple(e._replace(solved=e.solved[:, [0, *(1 + k for k in kept)]]) for e in marginal.eliminated),
         ),
-        (*members, *(tried[i].effect for i in best)),
-        np.array([*own_columns, *range(first, first + len(best))], dtype=np.int64),
-        np.array([*(float(s[0]) for s in sizes), *(0.0 for _ in best)]),
+        compared,
+        columns,
+        at_sizes,
         (*(s[1:] for s in sizes), *(np.array(tried[i].locations) for i in best)),
         (*(LOCATIONS if len(e.parameters) > 1 else 1 for e in members), *counts),
+        told,
+        counted,
     )
 
 

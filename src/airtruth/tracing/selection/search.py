@@ -15,7 +15,7 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.profile import best_location, location_index, relocated
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.best_first import NOTHING, best_first
+from airtruth.tracing.selection.best_first import best_first
 from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.explanation import shares, simplest
 from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior
@@ -33,7 +33,6 @@ def search(
     advance: Advance = lambda step: None,
     required: Collection[str] = (),
     known: Sequence[Mapping[str, float]] = (),
-    told: Mapping[str, tuple[float, float]] = NOTHING,
 ) -> tuple[SearchRound, ...]:
     """The rounds of the set that an answer states; none where not even the declared aircraft can be fitted.
 
@@ -49,9 +48,9 @@ def search(
     seed : seed of the random draws behind p-values.
     advance : receives the step that begins, or holds the time budget.
     required : keys of effects that the set has to hold, where any set has them.
-    known, told : as of `airtruth.tracing.selection.best_first.best_first`.
+    known : as of `airtruth.tracing.selection.best_first.best_first`.
     """
-    found = best_first(sets, hypothesis, start, effects, declared, advance, known, told)
+    found = best_first(sets, hypothesis, start, effects, declared, advance, known)
     if found is None:
         return ()
     chosen, left = _chosen(found, required)

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 _FIRST_ITERATIONS: Final = 6
 """Iterations from the declared aircraft with gusts taken as strong [-] (judgement)."""
+SAME: Final = 0.05
+"""Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 _ATTEMPTS: Final = 3
 """Number of refits that a fit is given to converge [-] (judgement)."""
 
@@ -113,6 +115,23 @@ class SetTable:
                 break
         return own
 
+    def count_kinematics(self, temper: float) -> bool:
+        """Count what the kinematics tells beside a likelihood that is divided by a ratio of variances; whether that changes it.
+
+        The fits that hold an error of the kinematics leave the table: they were made with another count.
+
+        Parameters
+        ----------
+        temper : the ratio [-].
+        """
+        told = self.problem.kinematics
+        if told is None or abs(np.log(temper / told.temper)) < SAME:
+            return False
+        self.problem = replace(self.problem, kinematics=replace(told, temper=temper))
+        self._best = {k: f for k, f in self._best.items() if not told.shows([e.key for e in k.effects])}
+        self._tried = {at for at in self._tried if not told.shows([e.key for e in at[0].effects])}
+        return True
+
     def keep(self, fitted: PosteriorFit) -> None:
         """Enter a fit that was made elsewhere, where the table holds no better one."""
         key = key_of(fitted.hypothesis)
@@ -152,4 +171,4 @@ def _name(effect: Effect) -> str:
     return effect.key
 
 
-__all__ = ["SetKey", "SetTable", "in_order_of", "key_of"]
+__all__ = ["SAME", "SetKey", "SetTable", "in_order_of", "key_of"]
