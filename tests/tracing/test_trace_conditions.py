@@ -8,7 +8,8 @@ import trace_records as tr
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.terms import Change
+from airtruth.physics.terms import Change, DeclaredTerm
+from airtruth.tracing.conditions import with_mean_derivatives
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
@@ -76,13 +77,32 @@ def test_the_order_of_the_conditions_does_not_matter(records, forward):
     np.testing.assert_allclose(turned.covariance, forward.covariance, rtol=1e-4, atol=1e-12)
 
 
-def test_the_inertia_turns_about_each_condition_s_own_derivatives():
-    """Increments of the moment: i times the declared derivatives of the condition."""
+@pytest.mark.parametrize("declared", [tr.TRUTH, DECLARED_FAST], ids=["slow", "fast"])
+def test_an_inertia_divides_the_derivatives_of_each_condition(declared):
+    """By definition: the increments -i d/(1 + i) of the mean d leave the moment that the declared factor 1 + i leaves."""
+    mean = 0.5 * (tr.TRUTH + DECLARED_FAST)
+    plant = replace(tr.plant(declared), mean_derivatives=mean)
     common = np.zeros(SHORT_PERIOD.common.size)
     common[SHORT_PERIOD.common.inertia] = 0.05
-    for declared in (tr.TRUTH, DECLARED_FAST):
-        packed = pack_aircraft(tr.plant(declared), compile_change(Change()), common)
-        np.testing.assert_allclose(packed.increments[LONGITUDINAL.row("Cm")], 0.05 * declared[3:], rtol=1e-12)
+    row = LONGITUDINAL.row("Cm")
+    common[row] = -0.05 / 1.05 * mean[row]
+    packed = pack_aircraft(plant, compile_change(Change()), common)
+    change = Change(declared=(DeclaredTerm("inertia", 1.05),))
+    expected = pack_aircraft(plant, compile_change(change), np.zeros_like(common))
+    np.testing.assert_allclose(packed.increments[row], 0.0, atol=1e-15)
+    assert packed.inertia_kg_m2 == pytest.approx(expected.inertia_kg_m2, rel=1e-15)
+
+
+def test_records_of_several_conditions_share_the_mean_of_the_fitted(records):
+    names = [f"{i}" for i in range(len(records))]
+    own = [replace(r, signals=replace(r.signals, run_id=n)) for r, n in zip(records, names, strict=True)]
+    shared = with_mean_derivatives(own, names[-1:])
+    mean = np.mean([r.plant.derivatives for r in records[:-1]], axis=0)
+    for r in shared:
+        np.testing.assert_allclose(r.plant.turned, mean, rtol=1e-15)
+    assert len({id(r.plant) for r in shared}) == len({id(r.plant) for r in records})
+    (alone,) = with_mean_derivatives(own[:1], ())
+    assert alone is own[0]
 
 
 def test_the_prior_of_two_conditions_is_their_mean_covariance(records):

@@ -19,6 +19,7 @@ from airtruth.tracing.model.plant import FLOW, Plant, declared_derivatives, line
 from airtruth.tracing.model.probed import engines, probed, probed_lateral, trim_of, with_throttle
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples
 from airtruth.tracing.model.remainder import remainders
+from airtruth.tracing.model.settings import declared_derivatives_of
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
@@ -79,6 +80,21 @@ def records_of(
         made = (TraceRecord(s, plant, length, x) for s, plant, x in zip(full, plants, more, strict=True))
         records |= dict(zip(group, made, strict=True))
     return [records[i] for i in range(len(signals))]
+
+
+def with_mean_derivatives(records: Sequence[TraceRecord], held: Sequence[str]) -> list[TraceRecord]:
+    """Records of several flight conditions, each plant with the declared derivatives averaged over those that are fitted.
+
+    Parameters
+    ----------
+    held : names of the records that are held out.
+    """
+    mean = declared_derivatives_of([r for r in records if r.signals.run_id not in held])
+    plants = {id(r.plant): r.plant for r in records}
+    if all(np.array_equal(plant.derivatives, mean) for plant in plants.values()):
+        return list(records)
+    plants = {number: replace(plant, mean_derivatives=mean) for number, plant in plants.items()}
+    return [replace(r, plant=plants[id(r.plant)]) for r in records]
 
 
 def flies(aircraft: Aircraft, motion: Motion) -> bool:

@@ -20,7 +20,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.reconstruction import is_reconstructed
-from airtruth.tracing.conditions import condition_notes, flies, records_of
+from airtruth.tracing.conditions import condition_notes, flies, records_of, with_mean_derivatives
 from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses, causes_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
@@ -113,7 +113,7 @@ def prepare(
     _check(signals, chosen, logs)
     model, notes = _model_of(aircraft, motion, options)
     notes.extend(_steady_notes(signals))
-    records = records_of(signals, aircraft, model, chosen)
+    records = with_mean_derivatives(records_of(signals, aircraft, model, chosen), chosen)
     fitted = tuple(r for r in records if r.signals.run_id not in chosen)
     has_throttle = all(r.signals.throttle is not None for r in fitted)
     absent = _absent(logs, motion)

@@ -350,7 +350,7 @@ def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rol
     upward, lead = gust_weights(GUST_1, rolloff)
     return AircraftMoves(
         inertia=1.0 + float(common[entries.inertia]),
-        turned=plant.derivatives[row] + common[row],
+        turned=plant.turned[row] + common[row],
         engine=np.zeros_like(plant.constant) + plant.power.constant,
         mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
         upward=upward,

@@ -39,7 +39,7 @@ def pack_lateral(
     inertia = float(common[entries.inertia])
     increments = common[entries.derivatives].copy()
     for row in (LATERAL.row(x.name) for x in LATERAL.coefficients if x.length is not None):
-        increments[row] += inertia * (plant.derivatives[row] + common[row])
+        increments[row] += inertia * (plant.turned[row] + common[row])
     ixx, izz = c.inertia_xx_kg_m2, c.inertia_zz_kg_m2
     ixz = c.inertia_xz_kg_m2 + declared["inertia_xz"] * math.sqrt(ixx * izz)
     return LateralAircraft(

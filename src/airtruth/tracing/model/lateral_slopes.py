@@ -319,7 +319,7 @@ def pack_lateral_moves(
     entries, plant = ParameterLayout(LATERAL).common, record.plant
     turned = np.zeros(len(LATERAL.derivatives))
     for row in (LATERAL.row(x.name) for x in LATERAL.coefficients if x.length is not None):
-        turned[row] = plant.derivatives[row] + common[row]
+        turned[row] = plant.turned[row] + common[row]
     side, lead = gust_weights(STATES, rolloff)
     return LateralMoves(
         inertia=1.0 + float(common[entries.inertia]),

@@ -27,7 +27,7 @@ def pack_aircraft(
     alpha, control, rate = table.axes
     inertia = float(common[entries.inertia])
     increments = common[entries.derivatives].copy()
-    increments[moment] += inertia * (plant.derivatives[moment] + common[moment])
+    increments[moment] += inertia * (plant.turned[moment] + common[moment])
     return AircraftArrays(
         area_m2=c.wing_area_m2,
         chord_m=c.chord_m,

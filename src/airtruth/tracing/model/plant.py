@@ -106,6 +106,7 @@ class Plant:
     alpha_shift_rad : subtracted from the measured angle of attack and pitch attitude [rad]; the linear model of the pitch plane
         counts them from its trim.
     power : engines at the trim, whose forces the pitch plane scales.
+    mean_derivatives : (derivatives,) declared values averaged over the flight conditions of all records; None for one condition.
     """
 
     aircraft: Aircraft
@@ -119,6 +120,7 @@ class Plant:
     trim: Trim | None
     alpha_shift_rad: float = 0.0
     power: Engines = field(default_factory=Engines)
+    mean_derivatives: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not go with the axis of the angle of attack, or with the motion.
@@ -138,6 +140,15 @@ class Plant:
         ):
             if array.shape != expected:
                 raise ValueError(f"plant: {name} has the shape {array.shape}, it needs {expected}")
+
+    @property
+    def turned(self) -> Array:
+        """(derivatives,) what a relative change of the inertia at equal accelerations adds to their increments [-].
+
+        The increments are common to all records. Those of the mean leave the differences between flight conditions to the
+        inertia, which divides them all.
+        """
+        return self.derivatives if self.mean_derivatives is None else self.mean_derivatives
 
     @property
     def alpha_rad(self) -> Array:

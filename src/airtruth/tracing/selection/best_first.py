@@ -123,9 +123,9 @@ class _BestFirst:
             if following is None and best.is_refitted and self._is_overfitted(fitted):
                 self._refused.append(fitted)
                 continue
-            if following is None and self._recounted():
-                continue
             if following is None or self.refits >= limit:
+                if self._recounted():
+                    continue
                 if swept or not self._is_misfit(fitted):
                     break
                 swept = True
