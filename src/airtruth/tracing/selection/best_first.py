@@ -189,8 +189,9 @@ class _BestFirst:
     def _sweep(self) -> None:
         """Refit every effect alone from the declared aircraft, until one of them leaves no anomaly beyond doubt.
 
-        About a fit that lacks a large effect no quadratic shows it.
+        About a fit that lacks a large effect no quadratic shows it. A refit ends where it cannot reach the odds of the best.
         """
+        rival = self._best().expansion.last.cost - self.temper * float(np.log(CRITERION.level))
         for effect in self.effects:
             key, first = frozenset((effect.key,)), effect.parameters[0]
             if key in self._fits or len(effect.parameters) > 1:
@@ -199,7 +200,7 @@ class _BestFirst:
                 return
             hypothesis = replace(self.hypothesis, effects=(effect,))
             size = np.array([(first.sign or 1.0) * first.material])
-            own = self.sets.fit_from_declared(hypothesis, size, self.null)
+            own = self.sets.fit_from_declared(hypothesis, size, self.null, rival)
             self.refits += 1
             self._enter(own)
             if own is not None and own.cost < self.null.cost and not self._is_misfit(own):
