@@ -71,7 +71,7 @@ def _tip(side: str, variant: str) -> Effect:
         distinguished_by="Roll damping falls with the aileron; aileron_effectiveness leaves Clp as it is. The rolling moment "
         "at rest grows with the lift.",
         in_derivatives=True,
-        prior=Prior(0.15, 0.0, 0.5, shape=0.3, log_odds=-5.0),
+        prior=Prior(0.15, 0.0, 0.5, shape=0.3, log_odds=-6.0),
     )
 
 
@@ -96,7 +96,7 @@ def _of_one(name: str, derivative: str, reach: float, material: float, words: tu
         source=source,
         distinguished_by=distinguished_by,
         in_derivatives=True,
-        prior=Prior(10.0 * material, -reach, reach, log_odds=-5.0),
+        prior=Prior(10.0 * material, -reach, reach, log_odds=-6.0),
     )
 
 
@@ -183,7 +183,7 @@ EFFECTS: Final = (
         source=f"dCmalpha = -CLalpha dx; {_TAIL}. Material: 1 % of the chord.",
         distinguished_by="A shift of the CG also changes Cmq and Cmde, by little.",
         in_derivatives=True,
-        prior=Prior(0.05, -0.15, 0.15, log_odds=-5.0),
+        prior=Prior(0.05, -0.15, 0.15, log_odds=-6.0),
     ),
     Effect(
         name="icing",
@@ -207,7 +207,7 @@ EFFECTS: Final = (
         distinguished_by="Pitch damping changes by a third of the share of the others; with tail_effectiveness by an "
         "equal share.",
         in_derivatives=True,
-        prior=Prior(1.0, 0.0, 4.0, shape=0.4, log_odds=-6.0),
+        prior=Prior(1.0, 0.0, 4.0, shape=0.4, log_odds=-7.0),
     ),
     Effect(
         name="derivatives",

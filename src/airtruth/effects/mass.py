@@ -107,7 +107,7 @@ EFFECTS: Final = (
         source="Moment transfer: dCm = CL dx + ...; Etkin and Reid, Dynamics of Flight, 3rd ed., 1996, ch. 2. "
         "Material: 1 % of the chord.",
         distinguished_by="Two loadings; with one, Cmalpha and Cmq absorb it.",
-        prior=Prior(0.05, -0.15, 0.15, log_odds=-3.0),
+        prior=Prior(0.05, -0.15, 0.15, log_odds=-4.0),
         event=LOADING,
     ),
     Effect(
@@ -153,7 +153,7 @@ EFFECTS: Final = (
         source="Euler's equations; Ixz is the integral of x z dm. Material: 0.02, one degree of inclination of the GTM's "
         "axes.",
         distinguished_by="It couples roll and yaw both ways; adverse yaw and Clr couple one way.",
-        prior=Prior(0.05, -0.3, 0.3, log_odds=-5.0),
+        prior=Prior(0.05, -0.3, 0.3, log_odds=-6.0),
         event=LOADING,
     ),
     Effect(
