@@ -189,9 +189,10 @@ class _BestFirst:
     def _sweep(self) -> None:
         """Refit every effect alone from the declared aircraft, until one of them leaves no anomaly beyond doubt.
 
-        About a fit that lacks a large effect no quadratic shows it. A refit ends where it cannot reach the odds of the best.
+        About a fit that lacks a large effect no quadratic shows it. A refit ends where it cannot come within the square of the
+        odds of the best, which leaves room for Occam's factors.
         """
-        rival = self._best().expansion.last.cost - self.temper * float(np.log(CRITERION.level))
+        rival = self._best().expansion.last.cost - 2.0 * self.temper * float(np.log(CRITERION.level))
         for effect in self.effects:
             key, first = frozenset((effect.key,)), effect.parameters[0]
             if key in self._fits or len(effect.parameters) > 1:
