@@ -194,6 +194,11 @@ class KinematicProblem:
         step = step if value < self.limits[name][1] - step else -step
         return (self.moments({**errors, name: value + step}) - moments) / step
 
+    def linearised(self, names: Sequence[str], errors: Mapping[str, float]) -> tuple[Array, Array]:
+        """(m,) moments at given errors, and (names, m) their derivatives in some of them."""
+        there = self.moments(errors)
+        return there, np.array([self.slope(name, errors, there) for name in names])
+
 
 def problem_of(
     records: Sequence[Samples],

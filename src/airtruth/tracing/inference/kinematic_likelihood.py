@@ -1,4 +1,4 @@
-"""What the kinematics of the fitted records tells of errors of sensors, apart from the aerodynamic model.
+"""Likelihood of the kinematics of the fitted records in errors of sensors, apart from the aerodynamic model.
 
     f(x) = (|m(x)|^2 - |m(0)|^2) / (2 e)
 
@@ -72,23 +72,21 @@ class KinematicLikelihood:
         if not shown:
             return KinematicTerms(0.0, slope, information)
         names = [effects[k].key for k in shown]
-        moments, slopes = self._at({n: float(sizes[k]) for n, k in zip(names, shown, strict=True)})
-        value = 0.5 * float(moments @ moments - self._none @ self._none) / self.search.enlargement
-        slope[shown] = slopes @ moments / self.search.enlargement
-        information[np.ix_(shown, shown)] = slopes @ slopes.T / self.search.enlargement
-        return KinematicTerms(value, slope, information)
+        along, slopes = self._at({n: float(sizes[k]) for n, k in zip(names, shown, strict=True)})
+        none, scale = self._none, self.search.enlargement
+        slope[shown] = slopes @ along / scale
+        information[np.ix_(shown, shown)] = slopes @ slopes.T / scale
+        return KinematicTerms(0.5 * float(along @ along - none @ none) / scale, slope, information)
 
     def _at(self, sizes: Mapping[str, float]) -> tuple[Array, Array]:
-        """(m,) moments and (sizes, m) their derivatives."""
+        """m (components,) at some sizes, and (sizes, components) its derivatives."""
         key = tuple(sizes.items())
         if key not in self._known:
-            problem = self.search.problem
             errors = {**self._others, **{name: self._error(name, size) for name, size in sizes.items()}}
-            moments = problem.moments(errors)
-            slopes = [problem.slope(name, errors, moments) * self._per_size(name) for name in sizes]
+            along, slopes = self.search.problem.linearised(list(sizes), errors)
             if len(self._known) >= _KEPT:
                 self._known.clear()
-            self._known[key] = moments, np.array(slopes)
+            self._known[key] = along, slopes * np.array([[self._per_size(name)] for name in sizes])
         return self._known[key]
 
     def _error(self, name: str, size: float) -> float:
@@ -110,7 +108,7 @@ class KinematicLikelihood:
 
     @cached_property
     def _none(self) -> Array:
-        return self.search.problem.moments(self._others)
+        return self.search.problem.linearised((), self._others)[0]
 
     @cached_property
     def _known(self) -> dict[tuple[tuple[str, float], ...], tuple[Array, Array]]:

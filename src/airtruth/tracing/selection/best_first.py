@@ -146,18 +146,11 @@ class _BestFirst:
         """Count the kinematics beside the present ratio of variances; whether fits were made again for it."""
         if not self.sets.count_kinematics(self.temper):
             return False
-        told = self.sets.problem.kinematics
         least = self._best().weighed.log_evidence + float(np.log(CRITERION.level))
-        changed = [
-            key
-            for key in self._fits
-            if told is not None
-            and told.shows(key)
-            and max(p.weighed.log_evidence for p in self._of_fit(key)) > least
-        ]
+        near = [k for k in self._fits if max(p.weighed.log_evidence for p in self._of_fit(k)) > least]
+        changed = [key for key in near if self.sets.counts_kinematics(key)]
         for key in changed:
-            for expansion in self._fits.pop(key):
-                last = expansion.last
+            for last in [expansion.last for expansion in self._fits.pop(key)]:
                 self._enter(self.sets.converged(last.hypothesis, last.point, near=last))
                 self.refits += 1
         self._predicted = self._predictions()
@@ -168,11 +161,17 @@ class _BestFirst:
         effects = tuple(e for e in self.effects if e.key in known and len(e.parameters) == 1)
         if not effects or not may_begin(self.advance, f"refit {' + '.join(e.key for e in effects)}"):
             return
-        sizes = np.array([e.parameters[0].size(known[e.key]) for e in effects])
+        self._from_declared(effects, [e.parameters[0].size(known[e.key]) for e in effects])
+
+    def _from_declared(
+        self, effects: tuple[Effect, ...], sizes: Sequence[float], rival: float = np.inf
+    ) -> PosteriorFit | None:
+        """Refit a set from the declared aircraft; None where it cannot reach a rival."""
         hypothesis = replace(self.hypothesis, effects=effects)
-        own = self.sets.fit_from_declared(hypothesis, sizes, self.null)
         self.refits += 1
+        own = self.sets.fit_from_declared(hypothesis, np.array(sizes), self.null, rival)
         self._enter(own)
+        return own
 
     def _is_overfitted(self, fitted: PosteriorFit) -> bool:
         """Whether records left out refuse a possible fit: another set may explain them all.
@@ -194,16 +193,12 @@ class _BestFirst:
         """
         rival = self._best().expansion.last.cost - 2.0 * self.temper * float(np.log(CRITERION.level))
         for effect in self.effects:
-            key, first = frozenset((effect.key,)), effect.parameters[0]
-            if key in self._fits or len(effect.parameters) > 1:
+            first = effect.parameters[0]
+            if frozenset((effect.key,)) in self._fits or len(effect.parameters) > 1:
                 continue
             if not may_begin(self.advance, f"refit {effect.key}"):
                 return
-            hypothesis = replace(self.hypothesis, effects=(effect,))
-            size = np.array([(first.sign or 1.0) * first.material])
-            own = self.sets.fit_from_declared(hypothesis, size, self.null, rival)
-            self.refits += 1
-            self._enter(own)
+            own = self._from_declared((effect,), [(first.sign or 1.0) * first.material], rival)
             if own is not None and own.cost < self.null.cost and not self._is_misfit(own):
                 return
 

@@ -7,7 +7,7 @@ the best fit remains, whatever the start.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -43,6 +43,11 @@ class SetKey(NamedTuple):
     effects: frozenset[Effect]
     unconstrained: tuple[int, ...]
     spread: bytes
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of the effects."""
+        return [e.key for e in self.effects]
 
 
 class SetTable:
@@ -123,6 +128,11 @@ class SetTable:
                 break
         return own
 
+    def counts_kinematics(self, keys: Collection[str]) -> bool:
+        """Whether the kinematics tells of any of some effects."""
+        told = self.problem.kinematics
+        return told is not None and told.shows(keys)
+
     def count_kinematics(self, temper: float) -> bool:
         """Count what the kinematics tells beside a likelihood that is divided by a ratio of variances; whether that changes it.
 
@@ -136,8 +146,8 @@ class SetTable:
         if told is None or abs(np.log(temper / told.temper)) < SAME:
             return False
         self.problem = replace(self.problem, kinematics=replace(told, temper=temper))
-        self._best = {k: f for k, f in self._best.items() if not told.shows([e.key for e in k.effects])}
-        self._tried = {at for at in self._tried if not told.shows([e.key for e in at[0].effects])}
+        self._best = {k: f for k, f in self._best.items() if not self.counts_kinematics(k.keys)}
+        self._tried = {at for at in self._tried if not self.counts_kinematics(at[0].keys)}
         return True
 
     def keep(self, fitted: PosteriorFit) -> None:
