@@ -17,7 +17,8 @@ from airtruth.checks.rotation import side_gravity
 from airtruth.checks.stated import Stated
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
-from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.units import DEG, FT, G0, KT, SLUG, UNITS
 
 Array = NDArray[np.float64]
@@ -111,7 +112,8 @@ def _unit_corrections(name: str, stated: Stated | None) -> Iterator[Correction]:
     own = next(iter(units))
     signed = dimension in _SIGNED
     if signed:
-        sides = name in ("aileron_rad", "aileron_command_rad")
+        ailerons = MOTION.controls[0]
+        sides = name in (ailerons.channel, ailerons.command)
         words = "opposite sign (left and right mixed up)" if sides else "opposite sign"
         yield Correction((name,), "sign", words, _setting(name, stated, sign=True), _scaled(name, -1.0))
     taken = own if stated is None else stated.unit
@@ -168,17 +170,16 @@ def _pulses(name: str, runs: Runs, stated: Stated | None) -> Iterator[Correction
 
 _SENSES: Final = (
     ("alpha_rad", "theta_rad", "q_rad_s"),
-    ("elevator_rad", "elevator_command_rad"),
+    *((c.channel, c.command) for c in LONGITUDINAL.controls),
     ("az_m_s2", "ax_m_s2"),
     ("phi_rad", "p_rad_s"),
     ("psi_rad", "r_rad_s"),
     ("beta_rad", "ay_m_s2"),
-    ("aileron_rad", "aileron_command_rad"),
-    ("rudder_rad", "rudder_command_rad"),
+    *((c.channel, c.command) for c in MOTION.controls),
 )
 """Groups of channels whose positive sense a recorder may have the other way round: pitch axis, elevator, specific force, roll,
 yaw, side, aileron, rudder."""
-_SURFACES: Final = tuple(n for m in MOTIONS.values() for c in m.controls for n in (c.channel, c.command))
+_SURFACES: Final = tuple(n for m in MOTIONS.values() for n in (*m.surfaces, *m.commands))
 """Control surfaces and their commands."""
 
 
@@ -298,7 +299,7 @@ def _standard(c: Channels) -> Array:
 
 def _lags(names: tuple[str, ...]) -> Iterator[Correction]:
     """Lags of a slow vane: without them its weak response passes for a wrong airspeed."""
-    vanes = [n for n in ("alpha_rad", "beta_rad") if n in names]
+    vanes = [motion.vane for motion in MOTIONS.values() if motion.vane in names]
     for name, lag in product(vanes, LAGS_S):
         yield Correction(
             (name,),

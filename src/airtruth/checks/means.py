@@ -12,6 +12,7 @@ from airtruth.channels import SIGNALS
 from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite, informed_everywhere
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
+from airtruth.physics.motion import MOTIONS
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
@@ -21,7 +22,7 @@ OUTSIDE: Final = 1000.0
 """Distance of a channel that leaves the range of flight [-]; larger than any sum of the others that matters."""
 LIMITS: Final = {
     **{name: (-one.limit, one.limit) for name, one in SIGNALS.items()},
-    **dict.fromkeys(("elevator_rad", "aileron_rad", "rudder_rad"), (-45.0 * DEG, 45.0 * DEG)),
+    **dict.fromkeys((n for m in MOTIONS.values() for n in m.surfaces), (-45.0 * DEG, 45.0 * DEG)),
     "throttle": (-0.05, 1.05),
 }
 """Range of every sample, SI (judgement: no aircraft leaves it; one degree taken as one radian usually does)."""

@@ -30,7 +30,7 @@ def unsupported(log: FlightLog, motion: Motion) -> str:
     missing = missing_channels(log, motion)
     if missing:
         return f"the log lacks {', '.join(missing)}"
-    surfaces = [c.channel for c in motion.controls]
+    surfaces = motion.surfaces
     if not any(_moves(log, run, surfaces, motion) for run in range(len(log))):
         return f"{' and '.join(surfaces)} do not move in any run, or the aircraft does not answer"
     return ""
