@@ -62,6 +62,10 @@ class Fit:
         """(k,) standard errors."""
         return np.asarray(np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0)))
 
+    def of(self, name: str, otherwise: float) -> float:
+        """Value of an error; another value where it was not free."""
+        return float(self.value[self.names.index(name)]) if name in self.names else otherwise
+
     @property
     def sound(self) -> bool:
         """Whether the fit may be used: it converged inside its range."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
-from airtruth.checks.result import CheckResult, Verdict
+from airtruth.checks.result import CheckResult
 
 COMPUTED: Final = (
     "alpha_rad was computed from airspeed_m_s, q_rad_s, az_m_s2 and, where they are recorded, ax_m_s2, theta_rad and altitude_m: "
@@ -32,12 +33,15 @@ def untestable(run_ids: Sequence[str]) -> CheckResult:
     )
 
 
-def without_vane(verdict: Verdict, words: Sequence[str]) -> tuple[Verdict, list[str]]:
-    """Return verdict and conclusions of a comparison of theta and q alone: it says nothing of the other channels."""
-    if verdict != "agrees":
-        return verdict, [COMPUTED, "theta_rad and q_rad_s were compared with each other.", *words, REMEDY]
-    found = "theta_rad follows the integral of q_rad_s; this alone was tested."
-    return "cannot_tell", [COMPUTED, found, *words[1:], REMEDY]
+def without_vane(result: CheckResult) -> CheckResult:
+    """Return the result of a comparison of theta and q alone: it says nothing of the other channels."""
+    words, verdict = result.sentences, result.verdict
+    if verdict == "agrees":
+        words = ("theta_rad follows the integral of q_rad_s; this alone was tested.", *words[1:])
+        verdict = "cannot_tell"
+    else:
+        words = ("theta_rad and q_rad_s were compared with each other.", *words)
+    return replace(result, verdict=verdict, sentences=(COMPUTED, *words, REMEDY))
 
 
 __all__ = ["COMPUTED", "REMEDY", "untestable", "without_vane"]
