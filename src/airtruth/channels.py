@@ -36,6 +36,11 @@ class LogChannel:
     to_si: float = 1.0
     limit: float = float("inf")
 
+    @property
+    def stem(self) -> str:
+        """Name without the unit."""
+        return self.name.removesuffix("_" + self.unit.replace("/", "_"))
+
 
 _LONGITUDINAL = (
     LogChannel("airspeed_m_s", "m/s", "speed", "true airspeed", "velocities/vt-fps", units.FT, 1000.0),
@@ -150,15 +155,17 @@ _LATERAL = (
 
 SIGNALS: Final[dict[str, LogChannel]] = {s.name: s for s in (*_LONGITUDINAL, *_LATERAL)}
 """Column name -> channel, in the order of the columns of a log (contract 1)."""
+PITCH_PLANE: Final = tuple(s.name for s in _LONGITUDINAL)
+"""Channels of a log in the pitch plane."""
 LATERAL: Final = tuple(s.name for s in _LATERAL)
 """Channels of the lateral-directional motion; every log may lack all of them."""
+ATTITUDE: Final = ("theta_rad", "phi_rad", "psi_rad")
+"""Angles of the attitude."""
 
 RUN_ID: Final = "run_id"
 """Column with the name of the run."""
 TIME: Final = "t_s"
 """Column with the time from the start of the run [s]."""
-REQUIRED: Final = ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")
-"""Channels that every log holds, besides density_kg_m3 or altitude_m."""
 
 
 def shown(channel: str) -> tuple[str, float]:

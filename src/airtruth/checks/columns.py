@@ -103,7 +103,7 @@ def _resembled(column: str, absent: list[str]) -> tuple[str, float] | None:
     best: tuple[str, float] | None = None
     for name in absent:
         likeness = difflib.SequenceMatcher(None, column, name).ratio()
-        stem = name.removesuffix("_" + SIGNALS[name].unit.replace("/", "_"))
+        stem = SIGNALS[name].stem
         if column == stem or (column.startswith(stem + "_") and len(column) <= len(name) + 4):
             likeness = max(likeness, 0.95)
         if likeness >= ALIKE and (best is None or likeness > best[1]):

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import LATERAL, SIGNALS
+from airtruth.channels import ATTITUDE, LATERAL, SIGNALS
 from airtruth.checks.excitation import turned
 from airtruth.checks.relation import ATMOSPHERE_M
 from airtruth.checks.rotation import side_gravity
@@ -213,7 +213,7 @@ def _of_all_axes(turns: tuple[str, ...]) -> list[tuple[str, ...]]:
     side = tuple(n for n in turns if n in LATERAL)
     rates = tuple(n for n in turns if SIGNALS[n].dimension == "angular_rate")
     surfaces = tuple(n for n in turns if n in _SURFACES)
-    attitude = tuple(n for n in turns if n in ("phi_rad", "theta_rad", "psi_rad"))
+    attitude = tuple(n for n in turns if n in ATTITUDE)
     angles = tuple(n for n in turns if n not in rates)
     motion = tuple(n for n in turns if n not in surfaces)
     found = [turns, angles, motion, rates, surfaces, attitude, ("az_m_s2", "ax_m_s2", "ay_m_s2")]

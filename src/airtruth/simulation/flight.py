@@ -140,7 +140,7 @@ class Flight:
         }
         if not self._lateral:
             return result
-        result |= lateral_channels(columns[own:], mass, *(surface.surface_rad for surface in self._lateral))
+        result |= lateral_channels(columns[own:], mass, [surface.surface_rad for surface in self._lateral])
         names = ("aileron_command_rad", "rudder_command_rad")
         commands = (c[:: self._record_every] for c in self._lateral_commands(inputs))
         return result | dict(zip(names, commands, strict=True))

@@ -135,7 +135,7 @@ def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> di
     still = {pitch.command: held.elevator_command_rad, "throttle": held.throttle}
     return (
         channels(columns[:own], at.mass_kg, model.elevator.surface_rad)
-        | lateral_channels(columns[own:], at.mass_kg, *scales)
+        | lateral_channels(columns[own:], at.mass_kg, scales)
         | {name: np.full(columns.shape[1], value) for name, value in still.items()}
         | {control.command: commands[control.name] for control in LATERAL.controls}
     )

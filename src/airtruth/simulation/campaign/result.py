@@ -13,6 +13,7 @@ import numpy as np
 from airtruth.channels import SIGNALS
 from airtruth.errors import LogError, choices, counted
 from airtruth.logs.names import chunk_file
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.result import shortened
 from airtruth.simulation.campaign.chunk import FAILED, INTERRUPTED, OK, Outcome
 from airtruth.simulation.campaign.plan import Plan
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-PLOTTED: Final = {"elevator_rad": "elevator", "alpha_rad": "alpha", "q_rad_s": "q", "az_m_s2": "az"}
+PLOTTED: Final = {c.channel: c.name for c in LONGITUDINAL.controls} | {
+    y.channel: y.name for y in LONGITUDINAL.outputs
+}
 """Channels, with their labels, that `CampaignResult.plot` shows: the input of the short period and its measured outputs."""
 PLOTTED_LATERAL: Final = {
     "aileron_rad": "aileron",
