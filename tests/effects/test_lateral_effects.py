@@ -189,7 +189,7 @@ def test_a_lost_wing_tip_rolls_to_its_side_at_rest(gtm, at, point, tmp_path, sid
     # lift of a tenth of the semispan at 0.93 of it, and the CG that moves to the other side
     assert sign * found[1] > 0.0
     held = trim(plane, at.condition)
-    assert sign * (held.aileron_rad - at.aileron_rad) > np.deg2rad(1.0)
+    assert sign * (held.surfaces_rad["aileron"] - at.surfaces_rad["aileron"]) > np.deg2rad(1.0)
 
 
 @pytest.mark.slow

@@ -32,7 +32,7 @@ def flown(gtm, level):
     gust = 0.5 * np.sin(2.0 * np.pi * 0.4 * t)
     still = np.zeros_like(t)
     return Flight(gtm, level, DT_S / EVERY).fly(
-        Inputs(still, gust, still, lateral=LateralInputs(aileron, rudder))
+        Inputs(still, gust, still, lateral=LateralInputs({"aileron": aileron, "rudder": rudder}))
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -30,17 +29,17 @@ def commands_for(executive: Executive, at: Trim, control: str, surface: Array) -
     control : "elevator", "aileron" or "rudder", which the model has.
     surface : wanted (steps,) [rad].
     """
-    key, held = f"{control}_command_rad", getattr(at.controls, f"{control}_command_rad")
-    offset = held - getattr(at, f"{control}_rad")
+    held = at.controls.command(control)
+    offset = held - at.surfaces_rad[control]
     if getattr(executive.model, control).feedback:
         return np.asarray(surface + offset)
     low, high = float(surface.min()) + offset, float(surface.max()) + offset
     commands = np.union1d(np.linspace(low - _BEYOND_RAD, high + _BEYOND_RAD, _GEARING), [held, 0.0])
     reached = []
     for command in commands:
-        controls = replace(at.controls, **{key: float(command)})
+        controls = at.controls.moved({control: float(command)})
         executive.initialise(at.condition, at.alpha_rad, controls, 0.0, 0.0)
-        reached.append(getattr(executive.respond(), f"{control}_rad"))
+        reached.append(executive.respond().surfaces_rad[control])
     rising = np.maximum.accumulate(reached)
     kept = np.append(True, np.diff(rising) > _SAME_RAD)
     if kept.sum() < 2:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG, G0, LBF
@@ -93,7 +94,7 @@ def grid_about(
 
     return ForceGrid(
         alpha_rad=whole(trim.alpha_rad, alpha_rad, DEG),
-        command_rad=whole(trim.controls.elevator_command_rad, command_rad, DEG),
+        command_rad=whole(trim.controls.command(ELEVATOR), command_rad, DEG),
         q_rad_s=whole(0.0, q_rad_s, 12.0 * DEG),
         airspeed=np.array([0.95, 1.0, 1.05]),
     )
@@ -122,7 +123,7 @@ def probe(
     axes = (
         _with(grid.airspeed, 1.0) * trim.airspeed_m_s,
         _with(grid.alpha_rad, trim.alpha_rad),
-        _with(grid.command_rad, trim.controls.elevator_command_rad),
+        _with(grid.command_rad, trim.controls.command(ELEVATOR)),
         _with(grid.q_rad_s, 0.0),
     )
     forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
@@ -135,9 +136,9 @@ def probe(
         at = (i, j, k, n)
         v, alpha, command, q = (float(axis[m]) for axis, m in zip(axes, at, strict=True))
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * v / trim.airspeed_m_s)
-        controls = replace(trim.controls, elevator_command_rad=command)
+        controls = trim.controls.moved({ELEVATOR: command})
         answer = states.respond(condition, alpha, controls, q)
-        surface[at] = answer.elevator_rad
+        surface[at] = answer.surfaces_rad[ELEVATOR]
         values[at] = [*(node.get_double_value() * LBF for node in forces), answer.q_dot_rad_s2 * inertia]
     return ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values)
 
@@ -320,13 +321,11 @@ class HeldStates:
         rates = (q_rad_s, p_rad_s, r_rad_s)
         if not self.holds:
             return self._settled(condition, alpha_rad, controls, rates)
-        command = controls.elevator_command_rad
-        wanted = self.trim.elevator_rad + command - self.trim.controls.elevator_command_rad
+        command = controls.command(ELEVATOR)
+        wanted = self.trim.elevator_rad + command - self.trim.controls.command(ELEVATOR)
         for _ in range(_HOLDS):
-            answer = self._settled(
-                condition, alpha_rad, replace(controls, elevator_command_rad=command), rates
-            )
-            error = wanted - answer.elevator_rad
+            answer = self._settled(condition, alpha_rad, controls.moved({ELEVATOR: command}), rates)
+            error = wanted - answer.surfaces_rad[ELEVATOR]
             if abs(error) < _SAME_SURFACE_RAD:
                 break
             command += error

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +17,8 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import FlightError
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.gearing import commands_for
 from airtruth.simulation.readings import READ, channels, require_sound
 from airtruth.simulation.simulator import Executive
@@ -54,7 +55,9 @@ def replay(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
     """
     executive = Executive(aircraft, track.dt_s / track.substeps)
     names = list(track.outputs)
-    free = np.array([first_of(track, "alpha_rad", at.alpha_rad), first_of(track, "q_rad_s", 0.0), 0.0])
+    free = np.array(
+        [first_of(track, LONGITUDINAL.vane, at.alpha_rad), first_of(track, LONGITUDINAL.gyros[0], 0.0), 0.0]
+    )
     # the surface about the aircraft's own trim: the offset is free in any case
     free[2] = at.elevator_rad - float(np.mean(track.elevator_rad[: max(1, track.substeps * 5)]))
 
@@ -116,7 +119,7 @@ def each_flown_through(
 
 def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str, Array]:
     """One simulation; channels at every step, at the CG, without sensors."""
-    command = commands_for(executive, at, "elevator", track.elevator_rad + free[2])
+    command = commands_for(executive, at, ELEVATOR, track.elevator_rad + free[2])
     executive = executive.renewed()
     fdm, elevator = executive.fdm, executive.model.elevator
     fdm.set_trim_status(True)  # actuators pass their input through
@@ -127,7 +130,7 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str,
     executive.initialise(
         at.condition,
         float(free[0]),
-        replace(at.controls, elevator_command_rad=float(command[0])),
+        at.controls.moved({ELEVATOR: float(command[0])}),
         float(free[1]),
     )
     executive.choose_integrator()
@@ -147,7 +150,7 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str,
     )
     require_sound(columns, executive.dt_s, f"{executive.aircraft.name}, flown through a measured surface,")
     return channels(columns, at.mass_kg, elevator.surface_rad) | {
-        "elevator_command_rad": command,
+        LONGITUDINAL.commands[0]: command,
         "throttle": np.full(columns.shape[1], at.controls.throttle),
     }
 

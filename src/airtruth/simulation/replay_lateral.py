@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -71,9 +70,7 @@ def replay_lateral(aircraft: Aircraft, at: Trim, track: LateralTrack) -> dict[st
     names, head = list(track.outputs), max(1, track.substeps * 5)
     trimmed = (at.controls.sideslip_rad, 0.0, 0.0, at.controls.bank_rad)
     start = [first_of(track, s.channel, at_trim) for s, at_trim in zip(LATERAL.states, trimmed, strict=True)]
-    offsets = [
-        getattr(at, f"{name}_rad") - float(np.mean(own[:head])) for name, own in track.controls_rad.items()
-    ]
+    offsets = [at.surfaces_rad[name] - float(np.mean(own[:head])) for name, own in track.controls_rad.items()]
 
     def fly(x: Array) -> Array:
         logged = as_logged(aircraft, _run(executive, at, track, x), track)
@@ -96,8 +93,8 @@ def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> di
     gusts = [node.set_double_value for node in executive.nodes(_GUST)]
     gusts[0]((at.airspeed_m_s - float(track.airspeed_m_s[0])) / FT)
     gusts[1](0.0)
-    first = {f"{name}_command_rad": float(command[0]) for name, command in commands.items()}
-    controls = replace(at.controls, bank_rad=phi, sideslip_rad=beta, **first)
+    first = {name: float(command[0]) for name, command in commands.items()}
+    controls = at.controls.moved(first, bank_rad=phi, sideslip_rad=beta)
     executive.initialise(at.condition, at.alpha_rad, controls, p_rad_s=p, r_rad_s=r)
     executive.choose_integrator()
     own = len(READ) + 1
@@ -132,7 +129,7 @@ def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> di
     require_sound(columns, executive.dt_s, f"{executive.aircraft.name}, flown through measured surfaces,")
     scales = [surface.surface_rad for surface in surfaces.values()]
     (pitch,), held = LONGITUDINAL.controls, at.controls
-    still = {pitch.command: held.elevator_command_rad, "throttle": held.throttle}
+    still = {pitch.command: held.command(pitch.name), "throttle": held.throttle}
     return (
         channels(columns[:own], at.mass_kg, model.elevator.surface_rad)
         | lateral_channels(columns[own:], at.mass_kg, scales)

@@ -14,10 +14,10 @@ from airtruth.channels import SIGNALS
 from airtruth.errors import LogError, choices, counted
 from airtruth.logs.names import chunk_file
 from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
 from airtruth.result import shortened
 from airtruth.simulation.campaign.chunk import FAILED, INTERRUPTED, OK, Outcome
 from airtruth.simulation.campaign.plan import Plan
-from airtruth.simulation.manoeuvres import ELEVATOR
 
 if TYPE_CHECKING:
     import pandas as pd

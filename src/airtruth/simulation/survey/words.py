@@ -110,8 +110,7 @@ def lateral(facts: Mapping[str, Any]) -> tuple[str, ...]:
     trimmed = (
         ("sideslip", test.beta_deg),
         ("bank", test.phi_deg),
-        ("aileron", test.aileron_deg),
-        ("rudder", test.rudder_deg),
+        *test.surfaces_deg.items(),
     )
     where = "wings level" if test.straight == "wings-level" else "no sideslip"
     lines = [
