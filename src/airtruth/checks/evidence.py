@@ -35,7 +35,7 @@ from airtruth.checks.factors import (
 )
 from airtruth.checks.means import LEVEL, LIMITS, air, gravity, ranges
 from airtruth.checks.relation import Relation
-from airtruth.checks.rotation import alpha_coupling, pitched
+from airtruth.checks.rotation import across_flow, alpha_coupling, pitched
 from airtruth.checks.slopes import slopes_near_trim
 from airtruth.checks.spectra import Factors, instruments, integral, regress
 from airtruth.checks.together import Runs
@@ -131,12 +131,13 @@ def _alpha_relation(runs: Runs, lines: NDArray[np.int64]) -> Relation:
     """Alpha against the integrals of q and of the vertical acceleration, the elevator or its command as the instrument."""
 
     def heave(c: Channels, dt_s: float) -> Array:
-        az, alpha, theta = c["az_m_s2"], c["alpha_rad"], c.get("theta_rad")
+        alpha, _, az = (c[name] for name in LONGITUDINAL.output_channels)
+        theta = c.get("theta_rad")
         ax = c.get("ax_m_s2", np.zeros_like(az))
         pitch = pitched(c, dt_s)
         level = alpha.mean(axis=1, keepdims=True) - pitch.mean(axis=1, keepdims=True)
         attitude = theta if theta is not None else pitch + level
-        force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(attitude - alpha)
+        force = across_flow(az, ax, alpha, attitude)
         if "phi_rad" in c:
             force = force - G0 * np.cos(alpha) * np.cos(attitude) * (1.0 - np.cos(c["phi_rad"]))
         return integral(force / c["airspeed_m_s"], dt_s)

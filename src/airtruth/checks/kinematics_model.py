@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_record import InstrumentError, Kinematics, Samples, stacked, thinned
 from airtruth.checks.pitch_motions import pitch_motions
-from airtruth.checks.rotation import alpha_coupling, pitch_coupling
+from airtruth.checks.rotation import across_flow, alpha_coupling, pitch_coupling
 from airtruth.checks.samples import derivative, earlier, integral, lagged
 from airtruth.physics.motion import LONGITUDINAL as MOTION
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
@@ -156,7 +156,7 @@ def compare(
     else:
         theta = earlier(record.theta, dt, error("theta_rad", "delay")) + error("theta_rad", "lag") * q
     alpha = swing + middle + error(_ALPHA, "arm") * q / record.airspeed
-    force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha)
+    force = across_flow(az, ax, alpha, theta)
     # the integral of x q_dot/V is x q/V up to the change of V, which does not matter over a manoeuvre
     turning = turned + arm * (q - q[..., :1]) / airspeed + integral(force / airspeed, dt)
     if record.rotated is not None:

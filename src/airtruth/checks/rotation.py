@@ -57,6 +57,11 @@ def side_gravity(theta: Array, phi: Array) -> Array:
     return np.asarray(G0 * np.cos(theta) * np.sin(phi))
 
 
+def across_flow(az: Array, ax: Array | float, alpha: Array, theta: Array) -> Array:
+    """Specific force and gravity across the path, az cos a - ax sin a + g cos(theta - a) [m/s2]."""
+    return np.asarray(az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha))
+
+
 def given(c: Channels, name: str) -> Array:
     """A channel of a log with roll and yaw, or zero where the log has none."""
     return c[name] if name in c else np.zeros_like(c["p_rad_s"])
@@ -90,6 +95,7 @@ def headed(c: Channels, dt_s: float) -> Array:
 
 
 __all__ = [
+    "across_flow",
     "alpha_coupling",
     "bank_coupling",
     "banked",

@@ -16,6 +16,7 @@ from airtruth.design.flight import LEAST_RECORDS, PlanOptions, best_condition, f
 from airtruth.design.narrow_result import BandHistories, ForecastQuantity, NarrowResult, NarrowRow
 from airtruth.design.search import REFERENCE, InputSearch, Rated, Setup, run
 from airtruth.errors import ConfigurationError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.simulator import Condition
@@ -169,14 +170,8 @@ def _row(rated: Rated, targets: Targets) -> NarrowRow:
 
 
 def _histories(flown: Flown, reference: Flown) -> BandHistories:
-    elevator, compared = (f.channels["elevator_rad"] for f in (flown, reference))
-    alpha = flown.channels["alpha_rad"]
-    return BandHistories(
-        t_s=flown.record.signals.dt_s * np.arange(len(elevator), dtype=np.float64),
-        elevator_rad=elevator - elevator[0],
-        reference_rad=compared - compared[0],
-        alpha_rad=alpha,
-    )
+    alpha = flown.channels[LONGITUDINAL.vane]
+    return BandHistories(flown.t_s, flown.moved_rad, reference.moved_rad, alpha)
 
 
 __all__ = ["Question", "Targets", "narrow"]

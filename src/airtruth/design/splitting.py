@@ -207,14 +207,8 @@ def _row(rated: Rated) -> InputRow:
 
 def _prediction(judged: Criterion, flown: Flown, reference: Flown) -> Prediction:
     first, second = judged.differences(flown.record)
-    dt = flown.record.signals.dt_s
-    return Prediction(
-        t_s=dt * np.arange(len(first), dtype=np.float64),
-        elevator_rad=flown.channels["elevator_rad"] - flown.channels["elevator_rad"][0],
-        reference_rad=reference.channels["elevator_rad"] - reference.channels["elevator_rad"][0],
-        difference=first - second,
-        noise=judged.model.settings.noise,
-    )
+    noise = judged.model.settings.noise
+    return Prediction(flown.t_s, flown.moved_rad, reference.moved_rad, first - second, noise)
 
 
 __all__ = ["enough_records", "reference_separation", "split"]
