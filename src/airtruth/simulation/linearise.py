@@ -98,7 +98,7 @@ def _answer(executive: Executive, trim: Trim, motion: Motion, change: Mapping[st
     commands = {c.name: at.command(c.name) + off.pop(c.channel) for c in motion.controls}
     alpha = trim.alpha_rad + off.pop(LONGITUDINAL.vane, 0.0)
     sideslip = at.sideslip_rad + off.pop(LATERAL.vane, 0.0)
-    executive.initialise(trim.condition, alpha, at.moved(commands, sideslip_rad=sideslip), **off)
+    executive.initialise(trim.condition, alpha, at.moved(commands, sideslip_rad=sideslip), off)
     answered = _coefficients(executive, trim) if motion is LATERAL else _accelerations(executive, trim, alpha)
     response = executive.respond()
     return np.array([*answered, *(response.surfaces_rad[c.name] for c in motion.controls)])

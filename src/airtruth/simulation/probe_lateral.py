@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.physics.motion import LATERAL
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
 from airtruth.simulation.probe import HeldStates, with_breaks_of
 from airtruth.simulation.simulator import Executive
@@ -92,7 +93,7 @@ class LateralStates:
         ----------
         signals : (5,) as `origin`; ratio : airspeed over that of the trim [-].
         """
-        beta, p, r = map(float, signals[:3])
+        beta, *rates = map(float, signals[:3])
         wanted = signals[3:]
         held, condition = self.trim.controls, self.trim.condition
         if ratio != 1.0:
@@ -102,7 +103,9 @@ class LateralStates:
             controls = held.moved(
                 dict(zip(LATERAL_CONTROLS, command.tolist(), strict=True)), sideslip_rad=beta
             )
-            answer = self._states.respond(condition, alpha_rad, controls, 0.0, p_rad_s=p, r_rad_s=r)
+            answer = self._states.respond(
+                condition, alpha_rad, controls, dict(zip(LATERAL.gyros, rates, strict=True))
+            )
             error = wanted - np.array([answer.surfaces_rad[name] for name in LATERAL_CONTROLS])
             if np.abs(error).max() < _SAME_SURFACE_RAD:
                 break

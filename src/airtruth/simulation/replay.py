@@ -132,7 +132,7 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str,
         at.condition,
         float(free[0]),
         at.controls.moved({ELEVATOR: float(command[0])}),
-        float(free[1]),
+        {LONGITUDINAL.gyros[0]: float(free[1])},
     )
     executive.choose_integrator()
     followed = FollowedSurface(executive, surface, command, wanted)

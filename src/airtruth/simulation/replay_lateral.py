@@ -91,7 +91,7 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str,
     gusts[1](0.0)
     first = {name: float(command[0]) for name, command in commands.items()}
     controls = at.controls.moved(first, bank_rad=phi, sideslip_rad=beta)
-    executive.initialise(at.condition, at.alpha_rad, controls, p_rad_s=p, r_rad_s=r)
+    executive.initialise(at.condition, at.alpha_rad, controls, dict(zip(LATERAL.gyros, (p, r), strict=True)))
     executive.choose_integrator()
     own = len(READ) + 1
     read = [*READ, model.elevator.surface, *READ_LATERAL, *(s.surface for s in surfaces.values())]

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, Literal
 
 import jsbsim
@@ -40,6 +41,16 @@ _STEADY: Final = 1e-9
 engine that settles with a time constant of 10 s is then 4e-8 from its steady state, less than the residual of a trim)."""
 _ENGINE_ROUNDS: Final = 4
 """Steady states of the engines before a run: the thrust of a piston engine is constant after two (measured)."""
+_RATES: Final = dict(
+    zip(
+        (*LATERAL.gyros, *LONGITUDINAL.gyros),
+        ("ic/p-rad_sec", "ic/r-rad_sec", "ic/q-rad_sec"),
+        strict=True,
+    )
+)
+"""Channel of an angular rate -> its initial condition."""
+AT_REST: Final[Mapping[str, float]] = MappingProxyType({})
+"""No angular rate."""
 STOPS: Final = (jsbsim.BaseError, RuntimeError, KeyError)
 """Exceptions that JSBSim raises on a model or a property."""
 _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
@@ -205,11 +216,8 @@ class Executive:
         condition: Condition,
         alpha_rad: float,
         controls: Controls,
-        q_rad_s: float = 0.0,
+        rates_rad_s: Mapping[str, float] = AT_REST,
         engines_s: float | None = None,
-        *,
-        p_rad_s: float = 0.0,
-        r_rad_s: float = 0.0,
     ) -> None:
         """Put the aircraft into a state at time zero, with lags, filters and engines settled.
 
@@ -218,9 +226,8 @@ class Executive:
         condition : airspeed, altitude and flight path.
         alpha_rad : angle of attack [rad].
         controls : commands, throttle, bank and sideslip.
-        q_rad_s : pitch rate [rad/s].
+        rates_rad_s : channel of an angular rate -> its value [rad/s]; 0 for one without an entry.
         engines_s : longest time for which engines and filters run, instead of that of the model [s].
-        p_rad_s, r_rad_s : roll and yaw rate [rad/s].
         """
         fdm = self.fdm
         self.six_axes = condition.six_axes
@@ -237,9 +244,7 @@ class Executive:
             ("ic/alpha-rad", alpha_rad),
             ("ic/beta-rad", 0.0),
             ("ic/gamma-rad", condition.gamma_rad),
-            ("ic/p-rad_sec", p_rad_s),
-            ("ic/q-rad_sec", q_rad_s),
-            ("ic/r-rad_sec", r_rad_s),
+            *((name, rates_rad_s.get(channel, 0.0)) for channel, name in _RATES.items()),
         ):
             fdm[name] = value
         if self.six_axes:

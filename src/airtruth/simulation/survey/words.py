@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
-from airtruth.simulation.survey.envelope import EnvelopeRow, FlightTest
+from airtruth.simulation.survey.envelope import STIFFNESS, EnvelopeRow, FlightTest
 from airtruth.simulation.survey.lateral_flight import LateralTest
 from airtruth.units import DEG, FT, KT
 
@@ -52,9 +52,9 @@ def flight(facts: Mapping[str, Any]) -> tuple[str, ...]:
             f"{test.duration_s:g} s with fixed controls: alpha moves {still:.2g} deg; with a doublet of "
             f"{test.amplitude_deg:g} deg {moved:.2g} deg"
         )
-    if test.derivatives["Cmalpha"] > 0.0:
+    if test.derivatives[STIFFNESS] > 0.0:
         lines.append(
-            "the aircraft is unstable at every airspeed that was trimmed at this altitude (Cmalpha above 0)"
+            f"the aircraft is unstable at every airspeed that was trimmed at this altitude ({STIFFNESS} above 0)"
         )
     if test.fault:
         lines.append(f"another record fails: {test.fault}")
