@@ -168,13 +168,15 @@ def _pulses(name: str, runs: Runs, stated: Stated | None) -> Iterator[Correction
         )
 
 
+_ALPHA, _Q, _AZ = LONGITUDINAL.output_channels
+_BETA, _P, _R, _PHI, _AY = MOTION.output_channels
 _SENSES: Final = (
-    ("alpha_rad", "theta_rad", "q_rad_s"),
+    (_ALPHA, "theta_rad", _Q),
     *((c.channel, c.command) for c in LONGITUDINAL.controls),
-    ("az_m_s2", "ax_m_s2"),
-    ("phi_rad", "p_rad_s"),
-    ("psi_rad", "r_rad_s"),
-    ("beta_rad", "ay_m_s2"),
+    (_AZ, "ax_m_s2"),
+    (_PHI, _P),
+    ("psi_rad", _R),
+    (_BETA, _AY),
     *((c.channel, c.command) for c in MOTION.controls),
 )
 """Groups of channels whose positive sense a recorder may have the other way round: pitch axis, elevator, specific force, roll,
@@ -216,7 +218,7 @@ def _of_all_axes(turns: tuple[str, ...]) -> list[tuple[str, ...]]:
     attitude = tuple(n for n in turns if n in ATTITUDE)
     angles = tuple(n for n in turns if n not in rates)
     motion = tuple(n for n in turns if n not in surfaces)
-    found = [turns, angles, motion, rates, surfaces, attitude, ("az_m_s2", "ax_m_s2", "ay_m_s2")]
+    found = [turns, angles, motion, rates, surfaces, attitude, (_AZ, "ax_m_s2", _AY)]
     found += [
         tuple(n for n in group if n in side) for group in (turns, angles, motion, rates, surfaces, attitude)
     ]
@@ -238,9 +240,9 @@ def _together(parts: tuple[Correction, ...]) -> Correction:
 def _gravity(c: Channels, name: str) -> Array:
     """Share of gravity in an accelerometer that an acceleration without gravity lacks [m/s2]."""
     theta = c.get("theta_rad", np.zeros_like(c[name]))
-    if name == "ay_m_s2":
-        return -side_gravity(theta, c.get("phi_rad", np.zeros_like(c[name])))
-    return -G0 * np.cos(theta) if name == "az_m_s2" else G0 * np.sin(theta)
+    if name == _AY:
+        return -side_gravity(theta, c.get(_PHI, np.zeros_like(c[name])))
+    return -G0 * np.cos(theta) if name == _AZ else G0 * np.sin(theta)
 
 
 def _gravity_corrections(name: str) -> Iterator[Correction]:

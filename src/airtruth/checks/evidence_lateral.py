@@ -42,9 +42,10 @@ BETA_STD: Final = (0.25, 0.35, 10.0)
 
 Lag of a vane; that of ay is free, because an arm of 1 m of a vane or an accelerometer can change it by 2.
 """
+_BETA, _P, _R, _PHI, SIDE_FORCE = LATERAL.output_channels
 BALANCED: Final = {
-    "aileron": ("p_rad_s", float(np.log(6.0)), 0.9),
-    "rudder": ("beta_rad", 0.0, 0.9),
+    "aileron": (_P, float(np.log(6.0)), 0.9),
+    "rudder": (_BETA, 0.0, 0.9),
 }
 """Control -> channel whose derivative balances it, logarithm of the usual ratio of both derivatives and its tolerance.
 
@@ -55,10 +56,8 @@ CLEAR: Final = 200.0
 """First-stage F above which two causes of sideslip are told apart [-]: twenty times that of one (judgement)."""
 SIGNIFICANT: Final = 3.0
 """Standard deviations by which both derivatives differ from zero where their ratio is tested [-]."""
-SIDE_FORCE: Final = LATERAL.outputs[-1].channel
-"""Channel of the specific force to the side."""
 SIDESLIP: Final = (
-    "beta_rad", "r_rad_s", "phi_rad", "ay_m_s2", "p_rad_s", "airspeed_m_s", "alpha_rad", "theta_rad",
+    _BETA, _R, _PHI, SIDE_FORCE, _P, "airspeed_m_s", LONGITUDINAL.vane, "theta_rad",
 )  # fmt: skip
 """Channels of the test "beta", the likeliest culprit first."""
 SIDE_SLOPE: Final = (float(np.log(2.0)), 0.8)
@@ -114,7 +113,7 @@ def _turn(c: Channels, dt_s: float) -> Array:
 
 def _gravity(c: Channels, dt_s: float) -> Array:
     _, _, _, phi, theta = rates(c)
-    return side_gravity(theta, phi if "phi_rad" in c else banked(c, dt_s)) / c["airspeed_m_s"]
+    return side_gravity(theta, phi if _PHI in c else banked(c, dt_s)) / c["airspeed_m_s"]
 
 
 def _force(c: Channels, dt_s: float) -> Array:

@@ -312,6 +312,25 @@ def _like(others: Sequence[str]) -> str:
     return f", like {' and '.join(others)}," if others else ""
 
 
+_SAMPLES: Final = (
+    (
+        columns.dropouts, "dropout", sum,
+        "zero in {:.0f} samples of {}, amid others that are not: dropouts; cut the runs there, or interpolate them before the "
+        "import",
+    ),
+    (
+        columns.spikes, "spike", sum,
+        "isolated outliers in {:.0f} samples of {}: errors of the recording; replace them by interpolated values before the "
+        "import, or cut the runs there",
+    ),
+    (
+        columns.frozen, "dropout", max,
+        "one value for up to {:.3g} s in {}, while the other channels require a change: the sensor was stuck; cut the runs there",
+    ),
+)  # fmt: skip
+"""Tests of samples: the runs that show a fault and a figure of each batch, code, the figure of all, and the words."""
+
+
 def _column_faults(several: Runs, aircraft: Aircraft | None, prescribed: bool) -> Iterator[Fault]:
     """Faults of single columns, each of all runs that show it."""
     count = len(several)
@@ -328,30 +347,11 @@ def _column_faults(several: Runs, aircraft: Aircraft | None, prescribed: bool) -
             f"{name}: constant in {where}, while other channels move: the sensor was not recorded; leave these "
             "runs or the channel out", certain, float(bad.sum()),
         )  # fmt: skip
-    for name, bad, figures in _over(several, columns.dropouts):
-        ids, where = named(bad)
-        zeros = sum(map(int, figures))
-        yield Fault(
-            name, ids, "dropout",
-            f"{name}: zero in {zeros} samples of {where}, amid others that are not: dropouts; cut the runs "
-            "there, or interpolate them before the import", True, float(zeros),
-        )  # fmt: skip
-    for name, bad, figures in _over(several, columns.spikes):
-        ids, where = named(bad)
-        outliers = sum(map(int, figures))
-        yield Fault(
-            name, ids, "spike",
-            f"{name}: isolated outliers in {outliers} samples of {where}: errors of the recording; replace them by "
-            "interpolated values before the import, or cut the runs there", True, float(outliers),
-        )  # fmt: skip
-    for name, bad, figures in _over(several, columns.frozen):
-        ids, where = named(bad)
-        longest = max(figures)
-        yield Fault(
-            name, ids, "dropout",
-            f"{name}: one value for up to {longest:.3g} s in {where}, while the other channels require a "
-            "change: the sensor was stuck; cut the runs there", True, longest,
-        )  # fmt: skip
+    for found, code, combined, words in _SAMPLES:
+        for name, bad, figures in _over(several, found):
+            ids, where = named(bad)
+            figure = float(combined(figures))
+            yield Fault(name, ids, code, f"{name}: {words.format(figure, where)}", True, figure)
     pairs = [set(columns.copies(part, aircraft, prescribed)) for part in several.parts]
     for one, other in sorted(set.intersection(*pairs)):
         commanded = {one, other} == {_CONTROL.channel, _CONTROL.command}

@@ -23,7 +23,7 @@ from airtruth.checks.kinematics_record import (
     records_of,
 )
 from airtruth.checks.kinematics_search import ErrorSearch, completed, search
-from airtruth.checks.kinematics_vaneless import untestable, without_vane
+from airtruth.checks.kinematics_vaneless import COMPUTED, WITHOUT_ATTITUDE, untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED
 from airtruth.checks.result import CheckResult, Finding
 from airtruth.logs.flight_log import FlightLog, batches
@@ -120,7 +120,7 @@ def check_kinematics(
     known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
     computed = any(is_reconstructed(one.channels) for one in logs)
     if computed and records[0].theta is None:
-        return untestable(tuple(r.run_id for r in records))
+        return untestable((r.run_id for r in records), COMPUTED, WITHOUT_ATTITUDE)
     equations = ("alpha",) if records[0].theta is None else ("theta",) if computed else ("theta", "alpha")
     if computed:
         usual = {name: size for name, size in usual.items() if name in ATTITUDE}

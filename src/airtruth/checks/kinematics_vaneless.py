@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
@@ -15,10 +15,17 @@ COMPUTED: Final = (
 """The first sentence of a check without a vane."""
 REMEDY: Final = "Compare the airspeed with ground speed on opposite headings and az_m_s2 with gravity at rest, or record a vane."
 """Advice on finding the errors that remain."""
+WITHOUT_ATTITUDE: Final = f"Without theta_rad q_rad_s is not assessed either. {REMEDY}"
+"""The second sentence of a check without a vane and without a pitch attitude."""
 
 
-def untestable(run_ids: Sequence[str]) -> CheckResult:
-    """Return the result of a check in which no channel is left to compare with another."""
+def untestable(run_ids: Iterable[str], *sentences: str) -> CheckResult:
+    """Return the result of a check in which no channel is left to compare with another.
+
+    Parameters
+    ----------
+    run_ids : names of the runs; sentences : the reason.
+    """
     return CheckResult(
         verdict="cannot_tell",
         run_ids=tuple(run_ids),
@@ -29,7 +36,7 @@ def untestable(run_ids: Sequence[str]) -> CheckResult:
         p_value=1.0,
         enlargement=1.0,
         residual_rms={},
-        sentences=(COMPUTED, f"Without theta_rad q_rad_s is not assessed either. {REMEDY}"),
+        sentences=sentences,
     )
 
 
@@ -44,4 +51,4 @@ def without_vane(result: CheckResult) -> CheckResult:
     return replace(result, verdict=verdict, sentences=(COMPUTED, *words, REMEDY))
 
 
-__all__ = ["COMPUTED", "REMEDY", "untestable", "without_vane"]
+__all__ = ["COMPUTED", "WITHOUT_ATTITUDE", "untestable", "without_vane"]
