@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from airtruth import style
 from airtruth.aircraft import Aircraft
+from airtruth.channels import PITCH_PLANE
 from airtruth.identification import Options, identify_batch, residuals
 from airtruth.logs.flight_log import Batch, batches
 from airtruth.logs.store import log_paths, read_log
@@ -23,7 +24,6 @@ from airtruth.simulation import manoeuvres
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign.chunk import Pilot
 from airtruth.simulation.flight import Flight, Inputs
-from airtruth.simulation.instruments import LOGGED
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.trim import trim
 from studies import paper_distribution as distribution
@@ -92,7 +92,7 @@ def flight_figure(moderate: Path, gtm: Aircraft) -> Figure:
     versions = {"measured": measured, "without sensor errors": noise_free, "calm air": calm}
     return figures.flight(
         batch.t_s[0],
-        {label: {name: channels[name] for name in LOGGED} for label, channels in versions.items()},
+        {label: {name: channels[name] for name in PITCH_PLANE} for label, channels in versions.items()},
         "One flight in moderate turbulence",
     )
 

@@ -172,7 +172,7 @@ def propellers(folder: Path) -> tuple[float, float]:
     settled = []
     for side in (-1.0, 1.0):
         one = executive.again()
-        one.initialise(at.condition, at.alpha_rad, at.controls, p_rad_s=0.0, r_rad_s=side * DEG)
+        one.initialise(at.condition, at.alpha_rad, at.controls, {"r_rad_s": side * DEG})
         one.respond()
         settled.append(row(one.fdm))
     change = np.subtract(settled[1], settled[0])

@@ -18,10 +18,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import REQUIRED
 from airtruth.errors import AirtruthError
 from airtruth.importers import convert, guess_mapping, import_log, open_source, read_mapping
 from airtruth.logs.flight_log import FlightLog
+from airtruth.physics.motion import LONGITUDINAL
 from validation.guess_corpus import HELD_OUT, LAYOUTS, Layout
 from validation.guess_flights import CRAFT, NOISE, flown
 
@@ -59,7 +59,7 @@ def scored(layout: Layout, folder: Path, seed: int = 1) -> Score:
     """Write a layout's file, guess and import."""
     path = folder / f"{layout.name.replace(' ', '_')}{layout.suffix}"
     layout.write(path, layout.craft, seed)
-    expected = {c for c in (*REQUIRED, "theta_rad", "ax_m_s2") if c not in layout.missing}
+    expected = {c for c in (*LONGITUDINAL.required, "theta_rad", "ax_m_s2") if c not in layout.missing}
     try:
         text = guess_mapping(path)
     except AirtruthError as error:
@@ -80,7 +80,7 @@ def scored(layout: Layout, folder: Path, seed: int = 1) -> Score:
     except AirtruthError as error:
         imported, error_text = False, str(error)
     lost = tuple(sorted(expected - mapped))
-    needs = (layout.missing & set(REQUIRED)) - {"alpha_rad"}
+    needs = (layout.missing & set(LONGITUDINAL.required)) - {"alpha_rad"}
     named = all(
         any(c in line for line in text.splitlines() if line.startswith("# Not mapped")) for c in needs
     )

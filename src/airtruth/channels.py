@@ -36,12 +36,17 @@ class LogChannel:
     to_si: float = 1.0
     limit: float = float("inf")
 
+    @property
+    def stem(self) -> str:
+        """Name without the unit."""
+        return self.name.removesuffix("_" + self.unit.replace("/", "_"))
+
 
 _LONGITUDINAL = (
     LogChannel("airspeed_m_s", "m/s", "speed", "true airspeed", "velocities/vt-fps", units.FT, 1000.0),
-    LogChannel("alpha_rad", "rad", "angle", "angle of attack, nose-up positive", "aero/alpha-rad", 1.0, 1.6),
+    LogChannel("alpha_rad", "rad", "angle", "angle of attack, nose-up positive", "aero/alpha-rad", limit=1.6),
     LogChannel(
-        "theta_rad", "rad", "angle", "pitch attitude, nose-up positive", "attitude/theta-rad", 1.0, 1.6
+        "theta_rad", "rad", "angle", "pitch attitude, nose-up positive", "attitude/theta-rad", limit=1.6
     ),
     LogChannel(
         "q_rad_s",
@@ -49,38 +54,31 @@ _LONGITUDINAL = (
         "angular_rate",
         "body pitch rate, nose-up positive",
         "velocities/q-rad_sec",
-        1.0,
-        10.0,
+        limit=10.0,
     ),
-    LogChannel("ax_m_s2", "m/s2", "acceleration", "specific force along body x (forward)", "", 1.0, 200.0),
+    LogChannel("ax_m_s2", "m/s2", "acceleration", "specific force along body x (forward)", limit=200.0),
     LogChannel(
         "az_m_s2",
         "m/s2",
         "acceleration",
         "specific force along body z (down); level flight about -9.8",
-        "",
-        1.0,
-        200.0,
+        limit=200.0,
     ),
     LogChannel(
         "elevator_rad",
         "rad",
         "angle",
         "elevator surface, mean of all; trailing edge down positive",
-        "",
-        1.0,
-        1.6,
+        limit=1.6,
     ),
     LogChannel(
         "elevator_command_rad",
         "rad",
         "angle",
         "elevator command sent to the actuator; trailing edge down positive",
-        "",
-        1.0,
-        1.6,
+        limit=1.6,
     ),
-    LogChannel("throttle", "-", "ratio", "throttle lever, 0 to 1", "", 1.0, 1.0),
+    LogChannel("throttle", "-", "ratio", "throttle lever, 0 to 1", limit=1.0),
     LogChannel("altitude_m", "m", "length", "pressure altitude", "position/h-sl-ft", units.FT, 30000.0),
     LogChannel(
         "density_kg_m3",
@@ -94,7 +92,7 @@ _LONGITUDINAL = (
 )
 _LATERAL = (
     LogChannel(
-        "beta_rad", "rad", "angle", "sideslip, wind from the right positive", "aero/beta-rad", 1.0, 1.6
+        "beta_rad", "rad", "angle", "sideslip, wind from the right positive", "aero/beta-rad", limit=1.6
     ),
     LogChannel(
         "p_rad_s",
@@ -102,8 +100,7 @@ _LATERAL = (
         "angular_rate",
         "body roll rate, right wing down positive",
         "velocities/p-rad_sec",
-        1.0,
-        10.0,
+        limit=10.0,
     ),
     LogChannel(
         "r_rad_s",
@@ -111,54 +108,49 @@ _LATERAL = (
         "angular_rate",
         "body yaw rate, nose right positive",
         "velocities/r-rad_sec",
-        1.0,
-        10.0,
+        limit=10.0,
     ),
     # of the angles of bank and heading whole turns are added up where they jump
     LogChannel("phi_rad", "rad", "angle", "bank, right wing down positive", "attitude/phi-rad"),
     LogChannel("psi_rad", "rad", "angle", "heading, nose right positive", "attitude/psi-rad"),
-    LogChannel("ay_m_s2", "m/s2", "acceleration", "specific force along body y (right)", "", 1.0, 200.0),
+    LogChannel("ay_m_s2", "m/s2", "acceleration", "specific force along body y (right)", limit=200.0),
     LogChannel(
         "aileron_rad",
         "rad",
         "angle",
         "aileron surface, (right - left)/2, each trailing edge down positive",
-        "",
-        1.0,
-        1.6,
+        limit=1.6,
     ),
-    LogChannel("rudder_rad", "rad", "angle", "rudder surface, trailing edge left positive", "", 1.0, 1.6),
+    LogChannel("rudder_rad", "rad", "angle", "rudder surface, trailing edge left positive", limit=1.6),
     LogChannel(
         "aileron_command_rad",
         "rad",
         "angle",
         "aileron command sent to the actuators, (right - left)/2, each trailing edge down positive",
-        "",
-        1.0,
-        1.6,
+        limit=1.6,
     ),
     LogChannel(
         "rudder_command_rad",
         "rad",
         "angle",
         "rudder command sent to the actuator, trailing edge left positive",
-        "",
-        1.0,
-        1.6,
+        limit=1.6,
     ),
 )
 
 SIGNALS: Final[dict[str, LogChannel]] = {s.name: s for s in (*_LONGITUDINAL, *_LATERAL)}
 """Column name -> channel, in the order of the columns of a log (contract 1)."""
+PITCH_PLANE: Final = tuple(s.name for s in _LONGITUDINAL)
+"""Channels of a log in the pitch plane."""
 LATERAL: Final = tuple(s.name for s in _LATERAL)
 """Channels of the lateral-directional motion; every log may lack all of them."""
+ATTITUDE: Final = ("theta_rad", "phi_rad", "psi_rad")
+"""Angles of the attitude."""
 
 RUN_ID: Final = "run_id"
 """Column with the name of the run."""
 TIME: Final = "t_s"
 """Column with the time from the start of the run [s]."""
-REQUIRED: Final = ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")
-"""Channels that every log holds, besides density_kg_m3 or altitude_m."""
 
 
 def shown(channel: str) -> tuple[str, float]:

@@ -56,7 +56,7 @@ def fly_lateral(plane, at: Condition, hz=200.0, amplitude=3.0 * DEG, duration=4.
     rudder = sample(Manoeuvre("doublet", 3.0 * amplitude, start_s=2.0, step_s=0.4), t)
     start = trim(plane, at, 1.0 / hz)
     flown = Flight(plane, start, 1.0 / hz).fly(
-        Inputs(zero, zero, zero, lateral=LateralInputs(aileron, rudder))
+        Inputs(zero, zero, zero, lateral=LateralInputs({"aileron": aileron, "rudder": rudder}))
     )
     return start, flown
 

@@ -93,7 +93,7 @@ def accelerations(plane, at, beta=0.0, p=0.0, r=0.0):
     """v_dot, p_dot, r_dot of a plane at another's trim with a sideslip and rates [m/s2, rad/s2]."""
     executive = Executive(plane, 1.0 / 200.0)
     controls = replace(at.controls, sideslip_rad=at.controls.sideslip_rad + beta)
-    executive.initialise(at.condition, at.alpha_rad, controls, p_rad_s=p, r_rad_s=r)
+    executive.initialise(at.condition, at.alpha_rad, controls, {"p_rad_s": p, "r_rad_s": r})
     found = executive.respond()
     return np.array([found.v_dot_m_s2, found.p_dot_rad_s2, found.r_dot_rad_s2])
 
@@ -189,7 +189,7 @@ def test_a_lost_wing_tip_rolls_to_its_side_at_rest(gtm, at, point, tmp_path, sid
     # lift of a tenth of the semispan at 0.93 of it, and the CG that moves to the other side
     assert sign * found[1] > 0.0
     held = trim(plane, at.condition)
-    assert sign * (held.aileron_rad - at.aileron_rad) > np.deg2rad(1.0)
+    assert sign * (held.surfaces_rad["aileron"] - at.surfaces_rad["aileron"]) > np.deg2rad(1.0)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from fly_campaigns import command, fly, read, results, write
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airtruth.simulation import instruments as measure
+from airtruth.channels import PITCH_PLANE
 from airtruth.simulation.campaign import plan, streams
 from airtruth.simulation.campaign import run as campaign
 from airtruth.simulation.campaign.air import air_of
@@ -158,5 +158,5 @@ def test_draws_and_gusts_of_a_pitch_plane_campaign_are_those_of_earlier_versions
     np.testing.assert_allclose(
         found, [-0.4378579444731933, -0.06596919047123283, -0.01491144717817038], rtol=1e-10
     )
-    numbers = dict(zip(measure.LOGGED, range(1, 12), strict=True))
-    assert {name: streams.SENSORS[name] for name in measure.LOGGED} == numbers
+    numbers = dict(zip(PITCH_PLANE, range(1, 12), strict=True))
+    assert {name: streams.SENSORS[name] for name in PITCH_PLANE} == numbers

@@ -9,7 +9,9 @@ STEPS = 4001
 
 
 def feedback(errors: float = 0.0, **gains) -> LateralFeedback:
-    return LateralFeedback(*(np.full(STEPS, e) for e in (errors, 2 * errors, 3 * errors)), every=4, **gains)
+    return LateralFeedback(
+        tuple(np.full(STEPS, e) for e in (errors, 2 * errors, 3 * errors)), every=4, **gains
+    )
 
 
 def loop(given: LateralFeedback, bank_rad: float = 0.0) -> tuple[Loop, dict[str, float]]:
@@ -21,14 +23,14 @@ def test_feedback_is_the_gains_times_the_readings_and_is_held():
     own, motion = loop(feedback(0.01, yaw_damper_gain_s=0.5, roll_damper_gain_s=0.2, bank_gain=0.4), 0.1)
     motion |= {"p": 0.3, "r": -0.2, "phi": 0.25}
     own.sample(8)
-    assert own.rudder_rad == pytest.approx(0.5 * (-0.2 + 0.02), abs=1e-15)
-    assert own.aileron_rad == pytest.approx(0.4 * (0.25 + 0.03 - 0.1) + 0.2 * (0.3 + 0.01), abs=1e-15)
-    before = own.aileron_rad
+    assert own.angles_rad[1] == pytest.approx(0.5 * (-0.2 + 0.02), abs=1e-15)
+    assert own.angles_rad[0] == pytest.approx(0.4 * (0.25 + 0.03 - 0.1) + 0.2 * (0.3 + 0.01), abs=1e-15)
+    before = own.angles_rad[0]
     motion["p"] = 9.0
     own.sample(11)
-    assert own.aileron_rad == before
+    assert own.angles_rad[0] == before
     own.sample(12)
-    assert own.aileron_rad != before
+    assert own.angles_rad[0] != before
 
 
 def test_feedback_is_added_to_the_commands_in_the_units_of_their_properties():
@@ -49,7 +51,7 @@ def test_washout_forgets_a_constant_yaw_rate():
     found = []
     for step in range(0, 800, 4):
         own.sample(step)
-        found.append(own.rudder_rad)
+        found.append(own.angles_rad[1])
     t = 0.02 * np.arange(1, len(found) + 1)
     np.testing.assert_allclose(found, 0.3 * np.exp(-t / 2.0), rtol=1e-12)
 
@@ -63,7 +65,7 @@ def test_washout_has_the_gain_of_its_high_pass():
     for k, time in enumerate(t):
         motion["r"] = np.sin(w * time)
         own.sample(4 * k)
-        found.append(own.rudder_rad)
+        found.append(own.angles_rad[1])
     late = t > 8.0
     basis = np.stack([np.sin(w * t[late]), np.cos(w * t[late])], axis=1)
     response = np.linalg.lstsq(basis, np.array(found)[late], rcond=None)[0] @ [1, 1j]

@@ -32,8 +32,8 @@ def test_both_have_the_same_equilibrium(level, own):
         level.alpha_rad,
         level.controls.sideslip_rad,
         level.elevator_rad,
-        level.aileron_rad,
-        level.rudder_rad,
+        level.surfaces_rad["aileron"],
+        level.surfaces_rad["rudder"],
     ]
     # JSBSim's gas constant differs from the 1976 standard's by 1e-5.
     np.testing.assert_allclose(found, [own.alpha, own.beta, *own.surfaces], atol=2e-6)
@@ -43,8 +43,8 @@ def test_both_have_the_same_equilibrium(level, own):
 def test_both_have_the_same_accelerations_off_the_trim(gtm, level, own):
     """Roll and yaw couple through Ixz, whose sign JSBSim takes the other way unless the model says so."""
     executive = Executive(gtm, 1.0 / 200.0)
-    moved = replace(level.controls, aileron_command_rad=0.1, rudder_command_rad=0.1)
-    executive.initialise(level.condition, level.alpha_rad, moved, p_rad_s=0.3, r_rad_s=-0.2)
+    moved = level.controls.moved({"aileron": 0.1, "rudder": 0.1})
+    executive.initialise(level.condition, level.alpha_rad, moved, {"p_rad_s": 0.3, "r_rad_s": -0.2})
     found = executive.respond()
     state = own.state
     state[3], state[5] = 0.3, -0.2
@@ -87,7 +87,7 @@ def test_a_doublet_matches_the_independent_integration(gtm, level, own, control)
     t = np.arange(samples) / hz
     zero = np.zeros(samples)
     command = AMPLITUDE_RAD * sample(Manoeuvre("doublet", 1.0, start_s=1.0, step_s=0.5), t)
-    lateral = LateralInputs(**{"aileron_rad": zero, "rudder_rad": zero, f"{control}_rad": command})
+    lateral = LateralInputs({control: command})
     flown = Flight(gtm, level, 1.0 / hz, hz // 50).fly(Inputs(zero, zero, zero, lateral=lateral))
     expected = lateral_flight.doublet(own, control, AMPLITUDE_RAD, 1.0, 0.5, t[:: hz // 50])
     for name in CHANNELS:

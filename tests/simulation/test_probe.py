@@ -111,7 +111,7 @@ def test_the_tables_of_a_turboprop_have_its_power(tmp_path):
     (tmp_path / "aircraft.toml").write_text(TURBOPROP)
     plane = aircraft.load(tmp_path)
     at = trim(plane, Condition(52.7, 1500.0, 0.0))
-    command = at.controls.elevator_command_rad + np.array([-DEG, 0.0, DEG])
+    command = at.controls.command("elevator") + np.array([-DEG, 0.0, DEG])
     alpha = at.alpha_rad + np.array([-DEG, 0.0, DEG])
     tables = probe(plane, at, ForceGrid(alpha, command, np.zeros(1), np.ones(1)))
     c = plane.constants
@@ -136,7 +136,7 @@ def test_the_plant_of_a_propeller_has_its_forces_at_other_angles_and_airspeeds(t
     plane = aircraft.load(tmp_path)
     at = trim(plane, Condition(51.7, 1500.0, 0.0))
     plant = probed(plane, at, (at.alpha_rad, 8.0 * DEG), (at.elevator_rad, at.elevator_rad), 0.1)
-    command = np.array([at.controls.elevator_command_rad])
+    command = np.array([at.controls.command("elevator")])
     other = ForceGrid(np.array([5.0, 7.5]) * DEG, command, np.zeros(1), np.array([0.94, 1.05]))
     tables = probe(plane, at, other)
     states = [(v, a) for v in range(3) for a in range(1, 3)]
@@ -151,7 +151,7 @@ def test_the_plant_of_a_propeller_has_its_forces_at_other_angles_and_airspeeds(t
     # a lever that is not the trim's: held straight
     held = with_throttle(plane, at, at.controls.throttle + 0.05)
     assert held.residual < 1e-5
-    assert held.controls.aileron != at.controls.aileron
+    assert held.controls.held["aileron"] != at.controls.held["aileron"]
 
 
 # -- breaks between the points of a grid
@@ -200,7 +200,7 @@ def test_the_breaks_of_a_model_whose_tables_are_in_radians():
     plane = aircraft.load("c172x")
     at = trim(plane, Condition(51.44, 1219.2))
     grid = ForceGrid(
-        np.arange(3.0, 9.0) * DEG, np.array([at.controls.elevator_command_rad]), np.zeros(1), np.ones(1)
+        np.arange(3.0, 9.0) * DEG, np.array([at.controls.command("elevator")]), np.zeros(1), np.ones(1)
     )
     found = with_breaks(plane, at, grid).alpha_rad
     assert max(np.abs(found - x).min() for x in (0.09, 0.10)) < 1e-4

@@ -32,7 +32,7 @@ def track(flown, **changes):
         "substeps": EVERY,
         "outputs": outputs,
         "weight": {c: float(outputs[c].std()) for c in CHANNELS},
-        "elevator_rad": flown["elevator_rad"],
+        "controls_rad": {"elevator": flown["elevator_rad"]},
         "airspeed_m_s": flown["airspeed_m_s"],
     }
     return Track(**(entries | changes))
@@ -44,7 +44,9 @@ def test_a_gearing_that_differs_up_and_down_is_inverted(paper_trim):
     at = trim(cessna, Condition(50.0, 1200.0))
     t = np.arange(601) * DT_S / EVERY
     surface = at.elevator_rad + np.interp(t, [0.5, 1.0, 1.5, 2.0], [0.0, 6.0 * DEG, -6.0 * DEG, 0.0])
-    flown = flown_through(cessna, at, Track(DT_S, EVERY, {}, {}, surface, np.full(t.size, at.airspeed_m_s)))
+    flown = flown_through(
+        cessna, at, Track(DT_S, EVERY, {}, {}, {"elevator": surface}, np.full(t.size, at.airspeed_m_s))
+    )
     assert np.ptp(surface) > 11.9 * DEG
     np.testing.assert_allclose(flown["elevator_rad"], surface, atol=0.05 * DEG)
 
@@ -60,8 +62,8 @@ def test_a_flight_through_its_own_surface_comes_back(gtm, paper_trim, flown):
 def test_a_record_that_departs_costs_the_others_nothing(gtm, paper_trim, flown):
     """A surface of 25 deg down leaves the range after a second; the other records have the bits of a flight alone."""
     sound = track(flown)
-    steps = np.arange(sound.elevator_rad.size) > 5 * EVERY
-    departs = track(flown, elevator_rad=paper_trim.elevator_rad + 25.0 * DEG * steps)
+    steps = np.arange(sound.airspeed_m_s.size) > 5 * EVERY
+    departs = track(flown, controls_rad={"elevator": paper_trim.elevator_rad + 25.0 * DEG * steps})
     first, lost, last = each_flown_through(gtm, [(paper_trim, t) for t in (sound, departs, sound)])
     assert lost is None
     alone = flown_through(gtm, paper_trim, sound)
@@ -75,7 +77,7 @@ def test_biases_initial_state_and_surface_offset_are_free(gtm, paper_trim, flown
     biases = {"alpha_rad": 0.01, "q_rad_s": -0.005, "az_m_s2": 0.2}
     outputs = {c: flown[c][::EVERY] + biases[c] for c in CHANNELS}
     surface = flown["elevator_rad"] + 0.004
-    again = replay(gtm, paper_trim, track(flown, outputs=outputs, elevator_rad=surface))
+    again = replay(gtm, paper_trim, track(flown, outputs=outputs, controls_rad={"elevator": surface}))
     for channel in CHANNELS:
         assert np.sqrt(np.mean((again[channel] - outputs[channel]) ** 2)) < 0.01 * outputs[channel].std(), (
             channel
@@ -85,7 +87,7 @@ def test_biases_initial_state_and_surface_offset_are_free(gtm, paper_trim, flown
 def test_a_late_surface_is_seen(gtm, paper_trim, flown):
     """60 ms late: the pitch rate of a 2 deg doublet is off by more than a tenth of itself."""
     late = np.concatenate([np.repeat(flown["elevator_rad"][:1], 12), flown["elevator_rad"][:-12]])
-    again = replay(gtm, paper_trim, track(flown, elevator_rad=late))
+    again = replay(gtm, paper_trim, track(flown, controls_rad={"elevator": late}))
     measured = flown["q_rad_s"][::EVERY]
     assert np.sqrt(np.mean((again["q_rad_s"] - measured) ** 2)) > 0.1 * measured.std()
 

@@ -6,7 +6,7 @@ import pytest
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.replay_lateral import replay_lateral
 from airtruth.simulation.simulator import Condition
-from airtruth.simulation.tracks import LateralTrack
+from airtruth.simulation.tracks import Track
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG, FT, KT
 
@@ -32,7 +32,7 @@ def flown(gtm, level):
     gust = 0.5 * np.sin(2.0 * np.pi * 0.4 * t)
     still = np.zeros_like(t)
     return Flight(gtm, level, DT_S / EVERY).fly(
-        Inputs(still, gust, still, lateral=LateralInputs(aileron, rudder))
+        Inputs(still, gust, still, lateral=LateralInputs({"aileron": aileron, "rudder": rudder}))
     )
 
 
@@ -46,7 +46,7 @@ def track(flown, **changes):
         "controls_rad": {c: flown[f"{c}_rad"] for c in ("aileron", "rudder")},
         "airspeed_m_s": flown["airspeed_m_s"],
     }
-    return LateralTrack(**(entries | changes))
+    return Track(**(entries | changes))
 
 
 def errors(again, measured):

@@ -84,7 +84,10 @@ def test_the_wings_are_level(gtm, level):
     assert level.residual < 1e-8
     assert c.bank_rad == 0.0
     # The increments of the rates are not zero at zero rate (NASA's tables): sideslip, aileron and rudder balance them.
-    assert [round(x / DEG, 2) for x in (c.sideslip_rad, level.aileron_rad, level.rudder_rad)] == [
+    assert [
+        round(x / DEG, 2)
+        for x in (c.sideslip_rad, level.surfaces_rad["aileron"], level.surfaces_rad["rudder"])
+    ] == [
         -0.05,
         0.08,
         -0.07,
@@ -139,7 +142,9 @@ def test_an_asymmetric_aircraft_is_trimmed(tmp_path, paper_condition, straight):
     lift_moment = at.mass_kg * 9.80665 * 0.1416 * FT / 12.0
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
     aileron = lift_moment / (TRUTH["Clda"] * pressure * plane.wing_area_m2 * plane.constants.span_m)
-    assert at.aileron_rad == pytest.approx(aileron, rel=0.02 if straight == "no-sideslip" else 0.1)
+    assert at.surfaces_rad["aileron"] == pytest.approx(
+        aileron, rel=0.02 if straight == "no-sideslip" else 0.1
+    )
     assert (at.controls.bank_rad == 0.0) == (straight == "wings-level")
 
 
@@ -199,7 +204,7 @@ def test_a_flight_in_the_pitch_plane_has_no_lateral_motion(gtm, paper_trim):
     fdm = flight._executive.fdm
     names = ("aero/beta-rad", "velocities/p-rad_sec", "velocities/r-rad_sec", "attitude/phi-rad")
     assert [fdm[name] for name in names] == [0.0, 0.0, 0.0, 0.0]
-    lateral = LateralInputs(still(401), still(401))
+    lateral = LateralInputs({})
     with pytest.raises(ConfigurationError, match="lateral inputs need a trim in six axes"):
         flight.fly(Inputs(still(401), still(401), still(401), lateral=lateral))
 
@@ -211,9 +216,10 @@ def test_a_flight_in_the_pitch_plane_has_no_lateral_motion(gtm, paper_trim):
 def test_signs_of_the_controls(gtm, level, control, signs):
     """Right aileron down: left wing down; rudder's trailing edge left: nose left, side force to the right."""
     step = np.where(np.arange(101) > 20, 1.0 * DEG, 0.0)
-    inputs = {"aileron_rad": still(101), "rudder_rad": still(101), control: step}
     flown = Flight(gtm, level, 1.0 / 200.0).fly(
-        Inputs(still(101), still(101), still(101), lateral=LateralInputs(**inputs))
+        Inputs(
+            still(101), still(101), still(101), lateral=LateralInputs({control.removesuffix("_rad"): step})
+        )
     )
     assert flown[control][-1] - flown[control][0] == pytest.approx(1.0 * DEG, rel=0.01)
     for name, sign in signs.items():
@@ -222,7 +228,7 @@ def test_signs_of_the_controls(gtm, level, control, signs):
 
 def test_bank_and_heading_have_no_jumps(gtm, level):
     """A bank that goes through half a turn, and a heading that starts below north, are added up."""
-    roll = LateralInputs(np.full(1201, -15.0 * DEG), still(1201))
+    roll = LateralInputs({"aileron": np.full(1201, -15.0 * DEG)})
     flown = Flight(gtm, level, 1.0 / 200.0, 4).fly(
         Inputs(still(1201), still(1201), still(1201), lateral=roll)
     )
@@ -236,8 +242,8 @@ def test_feedback_holds_bank_and_damps_the_dutch_roll(gtm, level):
     rudder = np.where((np.arange(1601) > 100) & (np.arange(1601) < 160), 3.0 * DEG, 0.0)
 
     def flown(**gains):
-        feedback = LateralFeedback(*[still(1601)] * 3, **gains)
-        lateral = LateralInputs(still(1601), rudder, feedback=feedback)
+        feedback = LateralFeedback((still(1601),) * 3, **gains)
+        lateral = LateralInputs({"rudder": rudder}, feedback=feedback)
         return Flight(gtm, level, 1.0 / 200.0, 4).fly(
             Inputs(still(1601), still(1601), still(1601), lateral=lateral)
         )

@@ -122,7 +122,7 @@ def test_a_propeller_starts_and_its_torque_is_held(tmp_path):
     assert at.residual < 1e-6
     # engines that have just started are within 1e-5 of the steady state that the trim has
     assert max(abs(r.v_dot_m_s2), abs(r.p_dot_rad_s2), abs(r.r_dot_rad_s2)) < 1e-5
-    assert at.controls.aileron != 0.0
+    assert at.controls.held["aileron"] != 0.0
     still = np.zeros(2001)
     flown = Flight(cessna, at, STEP_S, 4).fly(Inputs(still, still, still))
     assert np.ptp(flown["alpha_rad"]) < 1e-4 * DEG

@@ -90,8 +90,9 @@ def fly(plane, at, control, amplitude_deg):
     t = np.arange(1601) * STEP_S
     still = np.zeros_like(t)
     doublet = sample(Manoeuvre("doublet", amplitude_deg * DEG, start_s=1.0, step_s=0.5), t)
-    inputs = {"aileron_rad": still, "rudder_rad": still, f"{control}_rad": doublet}
-    return Flight(plane, at, STEP_S, 4).fly(Inputs(still, still, still, lateral=LateralInputs(**inputs)))
+    return Flight(plane, at, STEP_S, 4).fly(
+        Inputs(still, still, still, lateral=LateralInputs({control: doublet}))
+    )
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 from airtruth.checks.result import Finding
 from airtruth.effects.registry import EFFECTS
 from airtruth.logs.store import iter_logs
+from airtruth.quantity import Quantity
 from airtruth.simulation.campaign import run as campaign
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
@@ -96,7 +97,7 @@ def test_the_likelihood_of_the_kinematics_is_that_of_the_check(logs, gtm):
 def test_a_size_multiplies_a_declared_factor(logs, gtm):
     """The vane is declared with a scale of 1.1: a size of -0.1 is an error of 0.99."""
     file = gtm.file
-    vane = file.sensors["alpha_rad"].model_copy(update={"scale": 1.1})
+    vane = file.sensors["alpha_rad"].model_copy(update={"scale": Quantity(value=1.1)})
     declared = gtm.model_copy(
         update={"file": file.model_copy(update={"sensors": file.sensors | {"alpha_rad": vane}})}
     )

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from airtruth.physics.motion import Motion
 from airtruth.quantity import Strict
 
 
@@ -88,6 +89,11 @@ class JsbsimModel(Strict):
     declare: dict[str, float] = Field(default_factory=dict)
     lateral: LateralProperties | None = None
     engine_start_s: float = Field(default=0.0, ge=0.0, le=300.0)
+
+    def surfaces(self, motion: Motion) -> dict[str, SurfaceProperties]:
+        """Control -> properties of its surface, of the controls of a motion that the model has."""
+        every = {control.name: getattr(self, control.name) for control in motion.controls}
+        return {name: surface for name, surface in every.items() if surface is not None}
 
 
 __all__ = [

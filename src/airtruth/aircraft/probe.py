@@ -17,6 +17,7 @@ from airtruth.isolation.client import call
 from airtruth.isolation.limits import ProcessLimits
 from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.logs.temporary import private_folder, remove
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.quantity import Strict
 from airtruth.units import FT, SLUG
 
@@ -109,18 +110,22 @@ def _explain(error: IsolatedError, output: Path) -> str:
 
 def _named(table: dict[str, Any]) -> list[str]:
     """Properties of the [jsbsim] table, which the model has to have."""
-    elevator, throttle = table["elevator"], table["throttle"]
-    names = [elevator["command"], elevator["surface"], *throttle["command"], *throttle["trim"], *table["set"]]
+    names = [name for one in _surfaces(table) for name in (one["command"], one["surface"])]
+    names += [*table["throttle"]["command"], *table["throttle"]["trim"], *table["set"]]
     names += [*(table["augmentation"] or {}).values(), *(table["lateral"] or {}).values()]
-    for surface in filter(None, (table["aileron"], table["rudder"])):
-        names += [surface["command"], surface["surface"]]
     return names + [table[key] for key in _WRITTEN if table[key]]
 
 
+def _surfaces(table: dict[str, Any]) -> list[dict[str, Any]]:
+    """Tables of the control surfaces that the model has."""
+    controls = (*LONGITUDINAL.controls, *LATERAL.controls)
+    return [table[control.name] for control in controls if table[control.name]]
+
+
 def _refuse_control(folder: Path, table: dict[str, Any]) -> None:
-    names = [*table["set"], *table["declare"], table["elevator"]["command"], *table["throttle"]["command"]]
+    names = [*table["set"], *table["declare"], *table["throttle"]["command"]]
     names += (table["lateral"] or {}).values()
-    names += [table[name]["command"] for name in ("aileron", "rudder") if table[name]]
+    names += [surface["command"] for surface in _surfaces(table)]
     names += [table[name] for name in _WRITTEN if table[name]]
     for name in filter(controls_simulation, names):
         raise AircraftError(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.local_level import smoothed, walk_to_noise
 from airtruth.numerics.prefilter import butterworth
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -155,9 +156,9 @@ def attitude(channels: Mapping[str, Array], dt_s: float) -> Array:
     theta = channels.get("theta_rad")
     if theta is not None:
         return np.asarray(theta)
-    q = channels["q_rad_s"]
+    q = channels[LONGITUDINAL.gyros[0]]
     return np.asarray(
-        channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (q[1:] + q[:-1]))])
+        channels[LONGITUDINAL.vane][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (q[1:] + q[:-1]))])
     )
 
 
@@ -192,7 +193,7 @@ def ground_walk(channels: Mapping[str, Array], theta: Array, dt_s: float, *, ban
 
 def _path_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
     """Acceleration along the path (samples,) [m/s2], without ax that of gravity."""
-    alpha = channels["alpha_rad"]
+    alpha = channels[LONGITUDINAL.vane]
     along = -G0 * np.sin(theta - alpha)
     if "ax_m_s2" in channels:
         along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
@@ -204,7 +205,7 @@ def _banked_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
 
     Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1 (V').
     """
-    alpha, beta, phi = channels["alpha_rad"], channels["beta_rad"], channels["phi_rad"]
+    alpha, beta, phi = channels[LONGITUDINAL.vane], channels[LATERAL.vane], channels["phi_rad"]
     along = np.stack([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     gravity = np.stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
     total = G0 * (along * gravity).sum(axis=0)

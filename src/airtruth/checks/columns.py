@@ -15,11 +15,21 @@ from airtruth.aircraft import Aircraft
 from airtruth.channels import LATERAL, SIGNALS
 from airtruth.checks.excitation import turns
 from airtruth.checks.fault import Fault
-from airtruth.checks.rotation import bank_coupling, heading_rate, pitch_coupling, side_gravity, sideslip_turn
+from airtruth.checks.rotation import (
+    bank_coupling,
+    banked,
+    given,
+    headed,
+    pitched,
+    rates,
+    side_gravity,
+    sideslip_turn,
+)
 from airtruth.checks.spectra import integral
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.store import STATED_UNITS
 from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.units import G0, UNITS
 
@@ -32,8 +42,10 @@ OTHERS: Final = frozenset(
     }
 )  # fmt: skip
 """Columns that resemble a channel and are none: flaps, the flight path and the position."""
-SIDE: Final = ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "psi_rad", "ay_m_s2")
+SIDE: Final = tuple(n for n in LATERAL if n not in (*MOTION.surfaces, *MOTION.commands))
 """Channels of the lateral motion that move where the aircraft rolls or yaws."""
+PITCH: Final = (*LONGITUDINAL.output_channels, "theta_rad", "ax_m_s2")
+"""Channels of the longitudinal motion that move where the aircraft pitches."""
 ALIKE: Final = 0.84
 """Similarity (`difflib`) above which a column is taken for a misspelt channel; elevator_cmd_rad has 0.89."""
 COPIED: Final = 1e-9
@@ -70,7 +82,7 @@ SPIKE_SHARE: Final = 0.01
 
 def names(log: FlightLog) -> Iterator[Fault]:
     """Columns that resemble a channel that the log lacks."""
-    recorded = {"p_rad_s", "r_rad_s"} <= set(log.channels)
+    recorded = set(MOTION.gyros) <= set(log.channels)
     absent = [n for n in SIGNALS if n not in log.channels and (recorded or n not in LATERAL)]
     for column in log.channels:
         if column in SIGNALS or column.casefold() in OTHERS:
@@ -91,7 +103,7 @@ def _resembled(column: str, absent: list[str]) -> tuple[str, float] | None:
     best: tuple[str, float] | None = None
     for name in absent:
         likeness = difflib.SequenceMatcher(None, column, name).ratio()
-        stem = name.removesuffix("_" + SIGNALS[name].unit.replace("/", "_"))
+        stem = SIGNALS[name].stem
         if column == stem or (column.startswith(stem + "_") and len(column) <= len(name) + 4):
             likeness = max(likeness, 0.95)
         if likeness >= ALIKE and (best is None or likeness > best[1]):
@@ -177,16 +189,20 @@ def copies(batch: Batch, aircraft: Aircraft | None, prescribed: bool = False) ->
 
     A surface and its command differ by the declared actuator, unless the surface was prescribed.
     """
-    turning = turns(batch.channels, batch.dt_s).all() if "p_rad_s" in batch.channels else False
+    turning = turns(batch.channels, batch.dt_s).all() if MOTION.gyros[0] in batch.channels else False
     named = {n: v for n, v in batch.channels.items() if n in SIGNALS and (turning or n not in LATERAL)}
     moving = {n: v for n, v in named.items() if (v.std(axis=1) > MOVED).all()}
-    actuator = aircraft.file.elevator_actuator if aircraft is not None else None
-    lateral_pairs = [{c.channel, c.command} for c in MOTION.controls]
+    followed = [
+        {c.channel, c.command}
+        for c in (*LONGITUDINAL.controls, *MOTION.controls)
+        if c in MOTION.controls
+        or prescribed
+        or aircraft is None
+        or getattr(aircraft.file, c.actuator) is None
+    ]
     for one, other in combinations(moving, 2):
         pair = {one, other}
-        if pair == {"altitude_m", "density_kg_m3"} or pair in lateral_pairs:
-            continue
-        if pair == {"elevator_rad", "elevator_command_rad"} and (actuator is None or prescribed):
+        if pair == {"altitude_m", "density_kg_m3"} or pair in followed:
             continue
         a, b = (moving[n] - moving[n].mean(axis=1, keepdims=True) for n in (one, other))
         product = np.einsum("rn,rn->r", a, b) ** 2
@@ -198,16 +214,14 @@ def copies(batch: Batch, aircraft: Aircraft | None, prescribed: bool = False) ->
 def constant(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
     """Channels that keep one value in runs in which the others move, the runs, and their number."""
     c = batch.channels
-    judged = [
-        n for n in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "elevator_rad") if n in c
-    ]
+    judged = [n for n in (*PITCH, *LONGITUDINAL.surfaces) if n in c]
     still = {n: np.ptp(c[n], axis=1) == 0.0 for n in judged}
-    moving = sum((~still[n]).astype(int) for n in judged if n != "elevator_rad")
-    aside = {"p_rad_s", "r_rad_s"} <= c.keys()
+    moving = sum((~still[n]).astype(int) for n in judged if n in PITCH)
+    aside = c.keys() >= set(MOTION.gyros)
     turning = turns(c, batch.dt_s) if aside else np.zeros(len(batch.run_ids), dtype=np.bool_)
     for name in judged:
         bad = still[name] & (moving > 0)
-        if name == "elevator_rad":
+        if name not in PITCH:
             bad &= ~turning  # a manoeuvre of roll or yaw needs none
         if bad.any():
             yield name, np.asarray(bad), float(bad.sum())
@@ -228,8 +242,7 @@ def dropouts(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
     A channel that is about zero (a rate) drops out only where it jumps to zero and back: at rest it may be zero, and so may a
     coarse sample on its way from one sign to the other.
     """
-    pitch = ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "density_kg_m3")
-    for name in (*pitch, *SIDE):
+    for name in (*PITCH, "airspeed_m_s", "density_kg_m3", *SIDE):
         x = batch.channels.get(name)
         if x is None:
             continue
@@ -270,8 +283,7 @@ def spikes(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
         return
     from scipy.ndimage import median_filter
 
-    pitch = ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "altitude_m")
-    for name in (*pitch, *SIDE):
+    for name in (*PITCH, "airspeed_m_s", "altitude_m", *SIDE):
         x = batch.channels.get(name)
         if x is None:
             continue
@@ -308,46 +320,44 @@ def frozen(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
 def _required(c: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
     """Channels as the others require them, up to a constant and a slope."""
     result = _required_aside(c, dt_s)
-    if not {"alpha_rad", "q_rad_s", "az_m_s2", "airspeed_m_s"} <= c.keys():
+    channels = LONGITUDINAL.output_channels
+    if not {*channels, "airspeed_m_s"} <= c.keys():
         return result
-    turned = integral(c["q_rad_s"], dt_s)
-    if {"phi_rad", "r_rad_s"} <= c.keys():
-        turned = turned + integral(pitch_coupling(c["q_rad_s"], c["r_rad_s"], c["phi_rad"]), dt_s)
+    of_alpha, of_q, of_az = channels
+    alpha, q, az, speed = (c[n] for n in (*channels, "airspeed_m_s"))
+    turned = pitched(c, dt_s)
     if "theta_rad" in c:
         result["theta_rad"] = turned
-        result["q_rad_s"] = np.gradient(c["theta_rad"], dt_s, axis=1)
+        result[of_q] = np.gradient(c["theta_rad"], dt_s, axis=1)
     attitude = c.get("theta_rad", turned)
-    heave = (c["az_m_s2"] + G0 * np.cos(attitude - c["alpha_rad"])) / c["airspeed_m_s"]
-    path = integral(heave, dt_s)
-    result["alpha_rad"] = turned + path
-    result.setdefault("q_rad_s", np.gradient(c["alpha_rad"] - path, dt_s, axis=1))
-    slope = np.gradient(c["alpha_rad"], dt_s, axis=1)
-    result["az_m_s2"] = c["airspeed_m_s"] * (slope - c["q_rad_s"])
+    path = integral((az + G0 * np.cos(attitude - alpha)) / speed, dt_s)
+    result[of_alpha] = turned + path
+    result.setdefault(of_q, np.gradient(alpha - path, dt_s, axis=1))
+    result[of_az] = speed * (np.gradient(alpha, dt_s, axis=1) - q)
     return result
 
 
 def _required_aside(c: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
     """The lateral channels likewise."""
     result: dict[str, Array] = {}
-    if not {"p_rad_s", "r_rad_s", "airspeed_m_s"} <= c.keys():
+    if not {*MOTION.gyros, "airspeed_m_s"} <= c.keys():
         return result
-    p, r = c["p_rad_s"], c["r_rad_s"]
-    q, phi, theta, alpha = (
-        c.get(n, np.zeros_like(p)) for n in ("q_rad_s", "phi_rad", "theta_rad", "alpha_rad")
-    )
-    roll, yaw = bank_coupling(q, r, phi, theta), heading_rate(q, r, phi, theta)
-    if "phi_rad" in c:
-        result["phi_rad"] = integral(p + roll, dt_s)
-        result["p_rad_s"] = np.gradient(phi, dt_s, axis=1) - roll
+    of_beta, of_p, of_r, of_phi, of_ay = MOTION.output_channels
+    p, q, r, phi, theta = rates(c)
+    if of_phi in c:
+        result[of_phi] = banked(c, dt_s)
+        result[of_p] = np.gradient(phi, dt_s, axis=1) - bank_coupling(q, r, phi, theta)
     if "psi_rad" in c:
-        result["psi_rad"] = integral(yaw, dt_s)
-        result["r_rad_s"] = np.gradient(np.unwrap(c["psi_rad"], axis=1), dt_s, axis=1)
-    if "beta_rad" in c and "ay_m_s2" in c and "phi_rad" in c:
+        result["psi_rad"] = headed(c, dt_s)
+        result[of_r] = np.gradient(np.unwrap(c["psi_rad"], axis=1), dt_s, axis=1)
+    if {of_beta, of_ay, of_phi} <= c.keys():
+        alpha, speed = given(c, LONGITUDINAL.output_channels[0]), c["airspeed_m_s"]
         turn, pull = sideslip_turn(p, r, alpha), side_gravity(theta, phi)
-        result["beta_rad"] = integral(turn + (c["ay_m_s2"] + pull) / c["airspeed_m_s"], dt_s)
-        slope = np.gradient(c["beta_rad"], dt_s, axis=1)
-        result["ay_m_s2"] = c["airspeed_m_s"] * (slope - turn) - pull
-        result.setdefault("r_rad_s", p * np.sin(alpha) + (c["ay_m_s2"] + pull) / c["airspeed_m_s"] - slope)
+        push = (c[of_ay] + pull) / speed
+        result[of_beta] = integral(turn + push, dt_s)
+        slope = np.gradient(c[of_beta], dt_s, axis=1)
+        result[of_ay] = speed * (slope - turn) - pull
+        result.setdefault(of_r, p * np.sin(alpha) + push - slope)
     return result
 
 

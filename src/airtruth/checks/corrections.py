@@ -10,14 +10,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import LATERAL, SIGNALS
+from airtruth.channels import ATTITUDE, LATERAL, SIGNALS
 from airtruth.checks.excitation import turned
 from airtruth.checks.relation import ATMOSPHERE_M
 from airtruth.checks.rotation import side_gravity
 from airtruth.checks.stated import Stated
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
-from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.units import DEG, FT, G0, KT, SLUG, UNITS
 
 Array = NDArray[np.float64]
@@ -111,7 +112,8 @@ def _unit_corrections(name: str, stated: Stated | None) -> Iterator[Correction]:
     own = next(iter(units))
     signed = dimension in _SIGNED
     if signed:
-        sides = name in ("aileron_rad", "aileron_command_rad")
+        ailerons = MOTION.controls[0]
+        sides = name in (ailerons.channel, ailerons.command)
         words = "opposite sign (left and right mixed up)" if sides else "opposite sign"
         yield Correction((name,), "sign", words, _setting(name, stated, sign=True), _scaled(name, -1.0))
     taken = own if stated is None else stated.unit
@@ -166,19 +168,20 @@ def _pulses(name: str, runs: Runs, stated: Stated | None) -> Iterator[Correction
         )
 
 
+_ALPHA, _Q, _AZ = LONGITUDINAL.output_channels
+_BETA, _P, _R, _PHI, _AY = MOTION.output_channels
 _SENSES: Final = (
-    ("alpha_rad", "theta_rad", "q_rad_s"),
-    ("elevator_rad", "elevator_command_rad"),
-    ("az_m_s2", "ax_m_s2"),
-    ("phi_rad", "p_rad_s"),
-    ("psi_rad", "r_rad_s"),
-    ("beta_rad", "ay_m_s2"),
-    ("aileron_rad", "aileron_command_rad"),
-    ("rudder_rad", "rudder_command_rad"),
+    (_ALPHA, "theta_rad", _Q),
+    *((c.channel, c.command) for c in LONGITUDINAL.controls),
+    (_AZ, "ax_m_s2"),
+    (_PHI, _P),
+    ("psi_rad", _R),
+    (_BETA, _AY),
+    *((c.channel, c.command) for c in MOTION.controls),
 )
 """Groups of channels whose positive sense a recorder may have the other way round: pitch axis, elevator, specific force, roll,
 yaw, side, aileron, rudder."""
-_SURFACES: Final = tuple(n for m in MOTIONS.values() for c in m.controls for n in (c.channel, c.command))
+_SURFACES: Final = tuple(n for m in MOTIONS.values() for n in (*m.surfaces, *m.commands))
 """Control surfaces and their commands."""
 
 
@@ -212,10 +215,10 @@ def _of_all_axes(turns: tuple[str, ...]) -> list[tuple[str, ...]]:
     side = tuple(n for n in turns if n in LATERAL)
     rates = tuple(n for n in turns if SIGNALS[n].dimension == "angular_rate")
     surfaces = tuple(n for n in turns if n in _SURFACES)
-    attitude = tuple(n for n in turns if n in ("phi_rad", "theta_rad", "psi_rad"))
+    attitude = tuple(n for n in turns if n in ATTITUDE)
     angles = tuple(n for n in turns if n not in rates)
     motion = tuple(n for n in turns if n not in surfaces)
-    found = [turns, angles, motion, rates, surfaces, attitude, ("az_m_s2", "ax_m_s2", "ay_m_s2")]
+    found = [turns, angles, motion, rates, surfaces, attitude, (_AZ, "ax_m_s2", _AY)]
     found += [
         tuple(n for n in group if n in side) for group in (turns, angles, motion, rates, surfaces, attitude)
     ]
@@ -237,9 +240,9 @@ def _together(parts: tuple[Correction, ...]) -> Correction:
 def _gravity(c: Channels, name: str) -> Array:
     """Share of gravity in an accelerometer that an acceleration without gravity lacks [m/s2]."""
     theta = c.get("theta_rad", np.zeros_like(c[name]))
-    if name == "ay_m_s2":
-        return -side_gravity(theta, c.get("phi_rad", np.zeros_like(c[name])))
-    return -G0 * np.cos(theta) if name == "az_m_s2" else G0 * np.sin(theta)
+    if name == _AY:
+        return -side_gravity(theta, c.get(_PHI, np.zeros_like(c[name])))
+    return -G0 * np.cos(theta) if name == _AZ else G0 * np.sin(theta)
 
 
 def _gravity_corrections(name: str) -> Iterator[Correction]:
@@ -298,7 +301,7 @@ def _standard(c: Channels) -> Array:
 
 def _lags(names: tuple[str, ...]) -> Iterator[Correction]:
     """Lags of a slow vane: without them its weak response passes for a wrong airspeed."""
-    vanes = [n for n in ("alpha_rad", "beta_rad") if n in names]
+    vanes = [motion.vane for motion in MOTIONS.values() if motion.vane in names]
     for name, lag in product(vanes, LAGS_S):
         yield Correction(
             (name,),

@@ -35,11 +35,11 @@ from airtruth.checks.factors import (
 )
 from airtruth.checks.means import LEVEL, LIMITS, air, gravity, ranges
 from airtruth.checks.relation import Relation
-from airtruth.checks.rotation import alpha_coupling, pitch_coupling
+from airtruth.checks.rotation import across_flow, alpha_coupling, pitched
 from airtruth.checks.slopes import slopes_near_trim
 from airtruth.checks.spectra import Factors, instruments, integral, regress
 from airtruth.checks.together import Runs
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -69,30 +69,32 @@ ALPHA_STD: Final = (0.25, 0.25)
 def motion(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
     """Changes of the channels against each other."""
     names = set(runs.channels)
-    if not {"airspeed_m_s", "q_rad_s", "az_m_s2", "elevator_rad"} <= names:
+    vane, control = LONGITUDINAL.vane, LONGITUDINAL.controls[0]
+    surface, rate = control.channel, control.damped
+    if not set(LONGITUDINAL.required) - {vane} <= names:
         return []
     lines = runs.lines()
     result = []
     if "theta_rad" in names:
-        turned = runs.spectra(_turned)
-        factors = regress(runs.spectra(lambda c, dt_s: c["theta_rad"]), turned[:, None], lines=lines)
+        turned = runs.spectra(pitched)
+        factors = regress(runs.spectra_of("theta_rad")[:, 0], turned[:, None], lines=lines)
         banked = tuple(n for n in ("phi_rad", "r_rad_s") if {"phi_rad", "r_rad_s"} <= names)
-        test = follows_test("theta", ("q_rad_s", "theta_rad", *banked), factors, THETA_STD)
+        test = follows_test("theta", (rate, "theta_rad", *banked), factors, THETA_STD)
         result.append(of_moving(test, _pitches(runs)) if banked else test)
-    if "alpha_rad" in names:
+    if vane in names:
         result.append(_alpha_relation(runs, lines))
-    angle = (lambda c, dt_s: c["alpha_rad"]) if "alpha_rad" in names else _inertial_alpha
-    causes = [
-        runs.spectra(lambda c, dt_s, of=of: integral(of(c, dt_s), dt_s))  # type: ignore[misc]
-        for of in (lambda c, dt_s: c["elevator_rad"], angle, lambda c, dt_s: c["q_rad_s"])
-    ]
-    control = regress(runs.spectra(lambda c, dt_s: c["q_rad_s"]), np.stack(causes, axis=1), lines=lines)
-    result.append(sign_test("elevator", ("elevator_rad", "alpha_rad", "q_rad_s"), control))
-    if "alpha_rad" in names:
+    if vane in names:
+        causes = runs.integrals_of(surface, vane, rate)
+    else:
+        angle = runs.spectra(lambda c, dt_s: integral(_inertial_alpha(c, dt_s), dt_s))
+        causes = np.insert(runs.integrals_of(surface, rate), 1, angle, axis=1)
+    effect = regress(runs.spectra_of(rate)[:, 0], causes, lines=lines)
+    result.append(sign_test(control.name, (surface, vane, rate), effect))
+    if vane in names:
         result += slopes_near_trim(runs, aircraft)
-    if "elevator_command_rad" in names:
-        result.append(command_test(runs, LONGITUDINAL.controls[0], "q_rad_s"))
-    moving = runs.each(lambda c, dt_s: moves(c["elevator_rad"], dt_s).astype(np.float64)) > 0.0
+    if control.command in names:
+        result.append(command_test(runs, control))
+    moving = runs.each(lambda c, dt_s: moves(c[surface], dt_s).astype(np.float64)) > 0.0
     return [of_moving(test, moving) if test.name in OF_ELEVATOR else test for test in result]
 
 
@@ -100,25 +102,19 @@ def _pitches(runs: Runs) -> NDArray[np.bool_]:
     """(runs,) whether the pitch attitude changes, by theta or by the rates: in a manoeuvre of roll or yaw it may not."""
 
     def changes(c: Channels, dt_s: float) -> Array:
-        return np.asarray(np.maximum(swing(c["theta_rad"]), swing(_turned(c, dt_s))))
+        return np.asarray(np.maximum(swing(c["theta_rad"]), swing(pitched(c, dt_s))))
 
     return np.asarray(runs.each(changes) > LEAST_TURN_RAD)
 
 
-def _turned(c: Channels, dt_s: float) -> Array:
-    """Change of pitch attitude by the rates; wings level where no bank is known."""
-    turned = integral(c["q_rad_s"], dt_s)
-    if "phi_rad" not in c or "r_rad_s" not in c:
-        return turned
-    return turned + integral(pitch_coupling(c["q_rad_s"], c["r_rad_s"], c["phi_rad"]), dt_s)
-
-
 def _rotated(c: Channels, dt_s: float) -> Array:
     """Change of alpha by rotation; without sideslip where none is known."""
-    turned = integral(c["q_rad_s"], dt_s)
-    if not {"p_rad_s", "r_rad_s", "beta_rad"} <= c.keys():
+    turned = integral(c[LONGITUDINAL.gyros[0]], dt_s)
+    side = (*LATERAL.gyros, LATERAL.vane)
+    if not c.keys() >= set(side):
         return turned
-    return turned + integral(alpha_coupling(c["p_rad_s"], c["r_rad_s"], c["alpha_rad"], c["beta_rad"]), dt_s)
+    p, r, beta = (c[name] for name in side)
+    return turned + integral(alpha_coupling(p, r, c[LONGITUDINAL.vane], beta), dt_s)
 
 
 def _inertial_alpha(c: Channels, dt_s: float) -> Array:
@@ -126,7 +122,7 @@ def _inertial_alpha(c: Channels, dt_s: float) -> Array:
 
     A regression of q' on elevator and q alone gives the elevator the pitching moment of alpha, and with it the wrong sign.
     """
-    pitch = _turned(c, dt_s)
+    pitch = pitched(c, dt_s)
     attitude = c.get("theta_rad", pitch)
     return pitch + integral((c["az_m_s2"] + G0 * np.cos(attitude)) / c["airspeed_m_s"], dt_s)
 
@@ -135,25 +131,27 @@ def _alpha_relation(runs: Runs, lines: NDArray[np.int64]) -> Relation:
     """Alpha against the integrals of q and of the vertical acceleration, the elevator or its command as the instrument."""
 
     def heave(c: Channels, dt_s: float) -> Array:
-        az, alpha, theta = c["az_m_s2"], c["alpha_rad"], c.get("theta_rad")
+        alpha, _, az = (c[name] for name in LONGITUDINAL.output_channels)
+        theta = c.get("theta_rad")
         ax = c.get("ax_m_s2", np.zeros_like(az))
-        pitch = _turned(c, dt_s)
+        pitch = pitched(c, dt_s)
         level = alpha.mean(axis=1, keepdims=True) - pitch.mean(axis=1, keepdims=True)
         attitude = theta if theta is not None else pitch + level
-        force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(attitude - alpha)
+        force = across_flow(az, ax, alpha, attitude)
         if "phi_rad" in c:
             force = force - G0 * np.cos(alpha) * np.cos(attitude) * (1.0 - np.cos(c["phi_rad"]))
         return integral(force / c["airspeed_m_s"], dt_s)
 
-    angle = runs.spectra(lambda c, dt_s: c["alpha_rad"])
+    angle = runs.spectra_of(LONGITUDINAL.vane)[:, 0]
     kinematic = np.stack([runs.spectra(_rotated), runs.spectra(heave)], axis=1)
 
     def by(name: str) -> Factors:
         return regress(angle, kinematic, runs.padded(lambda c, dt_s: instruments(c[name], dt_s)), lines)
 
-    found = _alpha_test(by("elevator_rad"))
-    if "elevator_command_rad" in runs.channels:
-        by_command = by("elevator_command_rad")
+    control = LONGITUDINAL.controls[0]
+    found = _alpha_test(by(control.channel))
+    if control.command in runs.channels:
+        by_command = by(control.command)
         found = nearer(found, _alpha_test(by_command), by_command.strength > WEAK)
     return found
 

@@ -12,7 +12,7 @@ the left. A log whose every lateral channel has the opposite sense is the mirror
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -24,16 +24,16 @@ from airtruth.checks.factors import command_test, factor_test, follows_test, of_
 from airtruth.checks.lateral_model import driven
 from airtruth.checks.means import mean_test
 from airtruth.checks.relation import Relation, finite
-from airtruth.checks.rotation import bank_coupling, heading_rate, side_gravity, sideslip_turn
-from airtruth.checks.spectra import integral, regress, spectrum
+from airtruth.checks.rotation import banked, given, headed, rates, side_gravity, sideslip_turn
+from airtruth.checks.spectra import regress, spectrum
 from airtruth.checks.together import Runs
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.motion_parts import Control
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Channels = Mapping[str, Array]
-Signal = Callable[[Channels, float], Array]
 
 ATTITUDE_STD: Final = 0.15
 """Tolerance of the factors of bank and heading on the integrals of their rates [-]: scale and lag of gyroscopes."""
@@ -42,13 +42,12 @@ BETA_STD: Final = (0.25, 0.35, 10.0)
 
 Lag of a vane; that of ay is free, because an arm of 1 m of a vane or an accelerometer can change it by 2.
 """
-RATES: Final = {"aileron_rad": "p_rad_s", "rudder_rad": "r_rad_s"}
-"""Surface -> rate that it drives."""
+_BETA, _P, _R, _PHI, SIDE_FORCE = LATERAL.output_channels
 BALANCED: Final = {
-    "aileron_rad": ("p_rad_s", float(np.log(6.0)), 0.9),
-    "rudder_rad": ("beta_rad", 0.0, 0.9),
+    "aileron": (_P, float(np.log(6.0)), 0.9),
+    "rudder": (_BETA, 0.0, 0.9),
 }
-"""Surface -> channel whose derivative balances it, logarithm of the usual ratio of both derivatives and its tolerance.
+"""Control -> channel whose derivative balances it, logarithm of the usual ratio of both derivatives and its tolerance.
 
 Steady roll rate over aileron is 3 to 15 1/s, steady sideslip over rudder 0.4 to 1.6 (aircraft of Klein and Morelli and of
 Jategaonkar; the GTM has 9 1/s and 0.8).
@@ -58,7 +57,7 @@ CLEAR: Final = 200.0
 SIGNIFICANT: Final = 3.0
 """Standard deviations by which both derivatives differ from zero where their ratio is tested [-]."""
 SIDESLIP: Final = (
-    "beta_rad", "r_rad_s", "phi_rad", "ay_m_s2", "p_rad_s", "airspeed_m_s", "alpha_rad", "theta_rad",
+    _BETA, _R, _PHI, SIDE_FORCE, _P, "airspeed_m_s", LONGITUDINAL.vane, "theta_rad",
 )  # fmt: skip
 """Channels of the test "beta", the likeliest culprit first."""
 SIDE_SLOPE: Final = (float(np.log(2.0)), 0.8)
@@ -74,53 +73,31 @@ SIDE_SHARE: Final = 0.5
 def lateral(runs: Runs) -> list[Relation]:
     """Every test that the lateral channels allow, in the runs that roll or yaw."""
     names = set(runs.channels)
-    if not {"p_rad_s", "r_rad_s", "airspeed_m_s"} <= names:
+    if not {*LATERAL.gyros, "airspeed_m_s"} <= names:
         return []
     turning = runs.each(lambda c, dt_s: turns(c, dt_s).astype(np.float64)) > 0.0
     if not turning.any():
         return []
-    surfaces = tuple(n for n in RATES if n in names)
+    controls = tuple(c for c in LATERAL.controls if c.channel in names)
+    surfaces = tuple(c.channel for c in controls)
     result = _attitudes(runs)
-    if "ay_m_s2" in names:
-        mean = runs.each(lambda c, dt_s: c["ay_m_s2"].mean(axis=1))
+    if SIDE_FORCE in names:
+        mean = runs.each(lambda c, dt_s: c[SIDE_FORCE].mean(axis=1))
         std = np.full_like(mean, SIDE_LOAD_STD * G0)
-        result.append(mean_test("ay_mean", ("ay_m_s2",), mean, np.zeros_like(mean), std, SIDE_LOAD_STD * G0))
-    if "beta_rad" in names and surfaces:
+        result.append(mean_test("ay_mean", (SIDE_FORCE,), mean, np.zeros_like(mean), std, SIDE_LOAD_STD * G0))
+    if LATERAL.vane in names and surfaces:
         result += [_sideslip(runs), _side_slope(runs, surfaces)]
-    for name in surfaces:
-        moving = runs.each(lambda c, dt_s, n=name: moves(c[n], dt_s).astype(np.float64)) > 0.0  # type: ignore[misc]
-        result += [of_moving(test, moving) for test in _surface(runs, name, surfaces)]
-    for control in LATERAL.controls:
-        if {control.channel, control.command} <= names:
-            result.append(command_test(runs, control, RATES[control.channel]))
+    for control in controls:
+        moving = runs.each(lambda c, dt_s, n=control.channel: moves(c[n], dt_s).astype(np.float64)) > 0.0  # type: ignore[misc]
+        result += [of_moving(test, moving) for test in _surface(runs, control, surfaces)]
+    result += [command_test(runs, control) for control in controls if control.command in names]
     return [of_moving(test, turning) for test in result]
-
-
-def _zero(c: Channels, name: str) -> Array:
-    """A channel, or zero where the log has none."""
-    return c[name] if name in c else np.zeros_like(c["p_rad_s"])
-
-
-def _rates(c: Channels) -> tuple[Array, Array, Array, Array, Array]:
-    """p, q, r, phi, theta."""
-    p, q, r, phi, theta = (_zero(c, n) for n in ("p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad"))
-    return p, q, r, phi, theta
-
-
-def _bank(c: Channels, dt_s: float) -> Array:
-    p, q, r, phi, theta = _rates(c)
-    return integral(p + bank_coupling(q, r, phi, theta), dt_s)
-
-
-def _heading(c: Channels, dt_s: float) -> Array:
-    _, q, r, phi, theta = _rates(c)
-    return integral(heading_rate(q, r, phi, theta), dt_s)
 
 
 def _attitudes(runs: Runs) -> list[Relation]:
     """Bank and heading against the integrals of their rates."""
     result = []
-    for name, rate, of in (("phi", "p_rad_s", _bank), ("psi", "r_rad_s", _heading)):
+    for name, rate, of in zip(("phi", "psi"), LATERAL.gyros, (banked, headed), strict=True):
         if f"{name}_rad" not in runs.channels:
             continue
         measured = runs.spectra(lambda c, dt_s, n=name: np.unwrap(c[f"{n}_rad"], axis=1))  # type: ignore[misc]
@@ -129,19 +106,18 @@ def _attitudes(runs: Runs) -> list[Relation]:
     return result
 
 
-def _sideslip_parts() -> tuple[Signal, Signal, Signal]:
-    def turn(c: Channels, dt_s: float) -> Array:
-        return sideslip_turn(c["p_rad_s"], c["r_rad_s"], _zero(c, "alpha_rad"))
+def _turn(c: Channels, dt_s: float) -> Array:
+    p, _, r, _, _ = rates(c)
+    return sideslip_turn(p, r, given(c, LONGITUDINAL.vane))
 
-    def gravity(c: Channels, dt_s: float) -> Array:
-        _, _, _, phi, theta = _rates(c)
-        bank = phi if "phi_rad" in c else _bank(c, dt_s)
-        return side_gravity(theta, bank) / c["airspeed_m_s"]
 
-    def force(c: Channels, dt_s: float) -> Array:
-        return _zero(c, "ay_m_s2") / c["airspeed_m_s"]
+def _gravity(c: Channels, dt_s: float) -> Array:
+    _, _, _, phi, theta = rates(c)
+    return side_gravity(theta, phi if _PHI in c else banked(c, dt_s)) / c["airspeed_m_s"]
 
-    return turn, gravity, force
+
+def _force(c: Channels, dt_s: float) -> Array:
+    return given(c, SIDE_FORCE) / c["airspeed_m_s"]
 
 
 def _sideslip(runs: Runs) -> Relation:
@@ -149,8 +125,8 @@ def _sideslip(runs: Runs) -> Relation:
 
     Causes that these do not tell apart are summed. A gust at the vane is nearly a random walk, so that its rate is white.
     """
-    rate = runs.spectra(lambda c, dt_s: np.gradient(c["beta_rad"], dt_s, axis=1))
-    turn, gravity, force = (runs.spectra(of) for of in _sideslip_parts())
+    rate = runs.spectra(lambda c, dt_s: np.gradient(c[LATERAL.vane], dt_s, axis=1))
+    turn, gravity, force = (runs.spectra(of) for of in (_turn, _gravity, _force))
     instruments = runs.padded(lambda c, dt_s: spectrum(driven(c, dt_s)[1], dt_s))
     used = tuple(n for n in SIDESLIP if n in runs.channels)
     for causes in ([turn, gravity, force], [turn, gravity + force], [turn + gravity + force]):
@@ -165,16 +141,17 @@ def _sideslip(runs: Runs) -> Relation:
 
 def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
     """Slope of ay on beta, the rates and the surfaces held: its sign, and its size against the usual one."""
-    channels = ("ay_m_s2", "beta_rad", "p_rad_s", "r_rad_s", *surfaces)
-    if "ay_m_s2" not in runs.channels:
+    channels = (SIDE_FORCE, LATERAL.vane, *LATERAL.gyros, *surfaces)
+    if SIDE_FORCE not in runs.channels:
         return _nothing("side_slope", channels[1:], runs)
     value, std, clear = _slope(runs, channels)
     usual, tolerance = (np.full_like(value, x) for x in SIDE_SLOPE)
-    lift_channels = ("az_m_s2", "alpha_rad", "q_rad_s", "elevator_rad")
-    if set(lift_channels) <= set(runs.channels):
-        lift, lift_std, lifts = _slope(runs, lift_channels)
-        known = lifts & (lift > SIGNIFICANT * lift_std)
-        usual = np.where(known, np.log(np.where(known, lift, 1.0)) + SIDE_OF_LIFT[0], usual)
+    normal = LONGITUDINAL.outputs[-1].channel
+    of_alpha = (normal, LONGITUDINAL.vane, *LONGITUDINAL.gyros, *LONGITUDINAL.surfaces)
+    if set(of_alpha) <= set(runs.channels):
+        slope, slope_std, clear_slope = _slope(runs, of_alpha)
+        known = clear_slope & (slope > SIGNIFICANT * slope_std)
+        usual = np.where(known, np.log(np.where(known, slope, 1.0)) + SIDE_OF_LIFT[0], usual)
         tolerance = np.where(known, SIDE_OF_LIFT[1], tolerance)
     clear &= np.abs(value) > SIGNIFICANT * std
     against = np.minimum(value, 0.0) / std
@@ -186,8 +163,7 @@ def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
 
 def _slope(runs: Runs, channels: tuple[str, ...]) -> tuple[Array, Array, Bools]:
     """Slope of less the first channel on the second over gravity, the others held; its deviation; whether enough is explained."""
-    causes = [runs.spectra(_channel(n)) for n in channels[1:]]
-    factors = regress(runs.spectra(_channel(channels[0])), np.stack(causes, axis=1), lines=runs.lines())
+    factors = regress(runs.spectra_of(channels[0])[:, 0], runs.spectra_of(*channels[1:]), lines=runs.lines())
     std = np.sqrt(factors.covariance[:, 0, 0]) / G0
     return -factors.value[:, 0] / G0, std, factors.share > SIDE_SHARE
 
@@ -197,16 +173,15 @@ def _nothing(name: str, channels: tuple[str, ...], runs: Runs) -> Relation:
     return Relation(name, channels, none, np.stack([none, none, none], axis=1), none > 0.0)
 
 
-def _surface(runs: Runs, name: str, surfaces: tuple[str, ...]) -> list[Relation]:
+def _surface(runs: Runs, control: Control, surfaces: tuple[str, ...]) -> list[Relation]:
     """Effect of a surface on its rate, the other causes held: its sign, and its size against the derivative that balances it."""
-    rate = RATES[name]
+    name, rate = control.channel, control.damped
     others = [n for n in surfaces if n != name]
-    sideslip = [n for n in ("beta_rad",) if n in runs.channels]
-    names = (name, *others, *sideslip, "p_rad_s", "r_rad_s")
-    causes = [runs.spectra(_integral(n)) for n in names]
-    factors = regress(runs.spectra(_channel(rate)), np.stack(causes, axis=1), lines=runs.lines())
-    result = [sign_test(name.removesuffix("_rad"), (name, rate, *sideslip), factors)]
-    balance, usual, tolerance = BALANCED[name]
+    sideslip = [n for n in (LATERAL.vane,) if n in runs.channels]
+    names = (name, *others, *sideslip, *LATERAL.gyros)
+    factors = regress(runs.spectra_of(rate)[:, 0], runs.integrals_of(*names), lines=runs.lines())
+    result = [sign_test(control.name, (name, rate, *sideslip), factors)]
+    balance, usual, tolerance = BALANCED[control.name]
     if balance not in names:
         return result
     at = names.index(balance)
@@ -218,16 +193,8 @@ def _surface(runs: Runs, name: str, surfaces: tuple[str, ...]) -> list[Relation]
     spread = np.sqrt(tolerance**2 + (std[:, 0] / value[:, 0]) ** 2 + (std[:, at] / value[:, at]) ** 2)
     distance = finite(((np.log(np.maximum(ratio, 1e-9)) - usual) / spread) ** 2 * clear)
     figures = np.stack([ratio, ratio * spread], axis=1)
-    result.append(Relation(f"{name.removesuffix('_rad')}_size", (name, balance), distance, figures, clear))
+    result.append(Relation(f"{control.name}_size", (name, balance), distance, figures, clear))
     return result
-
-
-def _channel(name: str) -> Signal:
-    return lambda c, dt_s: c[name]
-
-
-def _integral(name: str) -> Signal:
-    return lambda c, dt_s: integral(c[name], dt_s)
 
 
 __all__ = ["lateral"]

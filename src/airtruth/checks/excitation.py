@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airtruth.checks.together import Runs
 from airtruth.numerics.whiteness import is_white
+from airtruth.physics.motion import LATERAL
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ def turns(channels: Mapping[str, Array], dt_s: float) -> NDArray[np.bool_]:
     channels : p_rad_s, r_rad_s and where recorded phi_rad, (runs, samples).
     dt_s : sample period [s].
     """
-    signals = [np.cumsum(channels[n], axis=1) * dt_s for n in ("p_rad_s", "r_rad_s") if n in channels]
+    signals = [np.cumsum(channels[n], axis=1) * dt_s for n in LATERAL.gyros if n in channels]
     signals += [np.unwrap(channels[n], axis=1) for n in ("phi_rad",) if n in channels]
     if not signals:
         return np.zeros(0, dtype=np.bool_)
@@ -41,7 +42,7 @@ def turns(channels: Mapping[str, Array], dt_s: float) -> NDArray[np.bool_]:
 
 def turned(runs: Runs) -> bool:
     """Whether any of several runs rolls or yaws."""
-    if not {"p_rad_s", "r_rad_s"} & set(runs.channels):
+    if not set(LATERAL.gyros) & set(runs.channels):
         return False
     return bool(runs.each(lambda c, dt_s: turns(c, dt_s).astype(np.float64)).any())
 

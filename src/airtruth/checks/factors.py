@@ -70,13 +70,13 @@ def sign_test(name: str, channels: tuple[str, ...], control: Factors) -> Relatio
     return Relation(name, channels, finite(t**2), np.stack([value, std], axis=1), informed)
 
 
-def command_test(runs: Runs, control: Control, rate: str) -> Relation:
+def command_test(runs: Runs, control: Control) -> Relation:
     """Surface against its command: factor and delay of the first-order expansion e = k c - k tau c'.
 
-    A damper or an attitude hold adds parts of a rate (``rate``), of its integral and of its derivative. The expansion with them
-    counts where it fits the requirement better.
+    A damper or an attitude hold adds parts of a rate, of its integral and of its derivative. The expansion with them counts
+    where it fits the requirement better.
     """
-    lines = runs.lines()
+    lines, rate = runs.lines(), control.damped
     surface = runs.spectra(lambda c, dt_s: c[control.channel])
     causes = [
         runs.spectra(cause)

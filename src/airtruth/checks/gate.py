@@ -22,12 +22,15 @@ from airtruth.checks.together import Runs
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import PRESCRIBED, Batch, FlightLog, batches
 from airtruth.logs.validate import validate
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+_CONTROL: Final = LONGITUDINAL.controls[0]
+"""Control whose column and command are judged apart from the others."""
 UNRELATED: Final = 0.1
 """Squared correlation of theta with the integral of q below which one of them is another axis."""
 UNRELATED_STD: Final = 0.05
@@ -69,9 +72,9 @@ def inspect(log: FlightLog, aircraft: Aircraft | None = None) -> tuple[Fault, ..
     single = list(_column_faults(runs, aircraft, bool(log.metadata.get(PRESCRIBED))))
     faults += single
     if not any(fault.certain for fault in single):  # which spoil the tests of motion
-        still = any(fault.channel == "elevator_rad" for fault in single)
+        still = any(fault.channel == _CONTROL.channel for fault in single)
         faults += _motion_faults(
-            runs.without("elevator_rad") if still else runs, aircraft, stated_of(log.metadata), len(runs)
+            runs.without(_CONTROL.channel) if still else runs, aircraft, stated_of(log.metadata), len(runs)
         )
     merged: dict[tuple[str, str, tuple[str, ...]], Fault] = {}
     for fault in faults:
@@ -163,7 +166,7 @@ def _motion_faults(
     count : number of runs of the log.
     """
     reconstructed = is_reconstructed(several.channels)
-    tested = several.without("alpha_rad") if reconstructed else several
+    tested = several.without(LONGITUDINAL.vane) if reconstructed else several
     aircraft = None if reconstructed else aircraft
     distances = total(relations(tested, aircraft))
     suspect = distances > SUSPECT
@@ -213,7 +216,7 @@ def _odd(
 
 def _drift(several: Runs, count: int) -> Iterator[Fault]:
     """A reconstruction that leaves the range of an angle of attack."""
-    alpha = Runs(tuple(replace(p, channels={"alpha_rad": p.channels["alpha_rad"]}) for p in several.parts))
+    alpha = several.without(*(name for name in several.channels if name != LONGITUDINAL.vane))
     for test in ranges(alpha):
         ids = tuple(several.run_ids[i] for i in np.flatnonzero(test.distance[:-1]))
         yield Fault(
@@ -309,6 +312,25 @@ def _like(others: Sequence[str]) -> str:
     return f", like {' and '.join(others)}," if others else ""
 
 
+_SAMPLES: Final = (
+    (
+        columns.dropouts, "dropout", sum,
+        "zero in {:.0f} samples of {}, amid others that are not: dropouts; cut the runs there, or interpolate them before the "
+        "import",
+    ),
+    (
+        columns.spikes, "spike", sum,
+        "isolated outliers in {:.0f} samples of {}: errors of the recording; replace them by interpolated values before the "
+        "import, or cut the runs there",
+    ),
+    (
+        columns.frozen, "dropout", max,
+        "one value for up to {:.3g} s in {}, while the other channels require a change: the sensor was stuck; cut the runs there",
+    ),
+)  # fmt: skip
+"""Tests of samples: the runs that show a fault and a figure of each batch, code, the figure of all, and the words."""
+
+
 def _column_faults(several: Runs, aircraft: Aircraft | None, prescribed: bool) -> Iterator[Fault]:
     """Faults of single columns, each of all runs that show it."""
     count = len(several)
@@ -319,40 +341,21 @@ def _column_faults(several: Runs, aircraft: Aircraft | None, prescribed: bool) -
 
     for name, bad, _ in _over(several, columns.constant):
         ids, where = named(bad)
-        certain = name != "elevator_rad" or _commanded(several.some(bad))
+        certain = name != _CONTROL.channel or _commanded(several.some(bad))
         yield Fault(
             name, ids, "constant",
             f"{name}: constant in {where}, while other channels move: the sensor was not recorded; leave these "
             "runs or the channel out", certain, float(bad.sum()),
         )  # fmt: skip
-    for name, bad, figures in _over(several, columns.dropouts):
-        ids, where = named(bad)
-        zeros = sum(map(int, figures))
-        yield Fault(
-            name, ids, "dropout",
-            f"{name}: zero in {zeros} samples of {where}, amid others that are not: dropouts; cut the runs "
-            "there, or interpolate them before the import", True, float(zeros),
-        )  # fmt: skip
-    for name, bad, figures in _over(several, columns.spikes):
-        ids, where = named(bad)
-        outliers = sum(map(int, figures))
-        yield Fault(
-            name, ids, "spike",
-            f"{name}: isolated outliers in {outliers} samples of {where}: errors of the recording; replace them by "
-            "interpolated values before the import, or cut the runs there", True, float(outliers),
-        )  # fmt: skip
-    for name, bad, figures in _over(several, columns.frozen):
-        ids, where = named(bad)
-        longest = max(figures)
-        yield Fault(
-            name, ids, "dropout",
-            f"{name}: one value for up to {longest:.3g} s in {where}, while the other channels require a "
-            "change: the sensor was stuck; cut the runs there", True, longest,
-        )  # fmt: skip
+    for found, code, combined, words in _SAMPLES:
+        for name, bad, figures in _over(several, found):
+            ids, where = named(bad)
+            figure = float(combined(figures))
+            yield Fault(name, ids, code, f"{name}: {words.format(figure, where)}", True, figure)
     pairs = [set(columns.copies(part, aircraft, prescribed)) for part in several.parts]
     for one, other in sorted(set.intersection(*pairs)):
-        commanded = {one, other} == {"elevator_rad", "elevator_command_rad"}
-        wrong = "elevator_rad" if commanded else culprit(relations(several, aircraft), one, other)
+        commanded = {one, other} == {_CONTROL.channel, _CONTROL.command}
+        wrong = _CONTROL.channel if commanded else culprit(relations(several, aircraft), one, other)
         right = other if wrong == one else one
         yield Fault(
             wrong, several.run_ids, "copy",
@@ -388,7 +391,7 @@ def _unrelated(several: Runs, failed: Relation) -> bool:
 
 
 def _commanded(several: Runs) -> bool:
-    name = "elevator_command_rad"
+    name = _CONTROL.command
     return name in several.channels and bool(
         (several.each(lambda c, dt_s: np.ptp(c[name], axis=1)) > 0.0).all()
     )

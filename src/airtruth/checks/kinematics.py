@@ -10,37 +10,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.channels import REQUIRED
 from airtruth.checks import poor
 from airtruth.checks.gate import admit
-from airtruth.checks.kinematics_bias import rms
-from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
+from airtruth.checks.kinematics_findings import bias_of, concluded, drift, errors_of
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, LongitudinalSamples, thinned
-from airtruth.checks.kinematics_record import declared_biases, declared_errors
+from airtruth.checks.kinematics_record import (
+    LONGEST_ARM_M,
+    USUAL_ARM_M,
+    declared_biases,
+    declared_errors,
+    records_of,
+)
 from airtruth.checks.kinematics_search import ErrorSearch, completed, search
-from airtruth.checks.kinematics_vaneless import untestable, without_vane
-from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
+from airtruth.checks.kinematics_vaneless import COMPUTED, WITHOUT_ATTITUDE, untestable, without_vane
+from airtruth.checks.kinematics_words import NAMED
 from airtruth.checks.result import CheckResult, Finding
-from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog, batches
 from airtruth.logs.validate import validate
-from airtruth.numerics.prefilter import butterworth, edge_samples
+from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LONGITUDINAL as MOTION
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-MOST_RECORDS: Final = 20
-"""Records judged together [-]: judgement; more add little, and time grows with them."""
 LONGEST_ARM_CHORDS: Final = 7.0
 """Largest arm [chords]: judgement; the nose boom of ATTAS is 4.1 chords ahead of the CG, and the fuselage of a Boeing
 747 is 8.5 chords long."""
-LONGEST_ARM_M: Final = 40.0
-"""Largest arm where no chord is known [m]: judgement, half the length of the largest aircraft."""
-USUAL_ARM_M: Final = 10.0
-"""Arm that is not unusual where no chord is known [m]: judgement."""
-ROTATION: Final = ("p_rad_s", "r_rad_s", "phi_rad", "beta_rad")
+ROTATION: Final = (*LATERAL.gyros, "phi_rad", LATERAL.vane)
 """Channels without one of which the wings count as level."""
 AIRSPEED: Final = ("sensor_delay:airspeed_m_s", "airspeed_alpha_slope")
 """Errors that the equation of airspeed shows."""
@@ -101,7 +99,7 @@ def check_kinematics(
 
     Parameters
     ----------
-    log : flight log, or several; of many runs the first `MOST_RECORDS` with an elevator that moves are taken.
+    log : flight log, or several; of many runs the first `kinematics_record.MOST_RECORDS` with an elevator that moves are taken.
     declared : instrument errors that are known, names of
         `airtruth.checks.kinematics_model.ERRORS` in SI; see `airtruth.checks.kinematics_record.declared_errors`.
     chord_m : mean aerodynamic chord, which limits arms to `LONGEST_ARM_CHORDS` [m]; None takes that of the log.
@@ -122,7 +120,7 @@ def check_kinematics(
     known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
     computed = any(is_reconstructed(one.channels) for one in logs)
     if computed and records[0].theta is None:
-        return untestable(tuple(r.run_id for r in records))
+        return untestable((r.run_id for r in records), COMPUTED, WITHOUT_ATTITUDE)
     equations = ("alpha",) if records[0].theta is None else ("theta",) if computed else ("theta", "alpha")
     if computed:
         usual = {name: size for name, size in usual.items() if name in ATTITUDE}
@@ -130,66 +128,32 @@ def check_kinematics(
     airspeed = () if computed else _airspeed(found)
     findings = (*errors_of(found, usual), *airspeed, *_biases(found, biases or {}))
     findings = _scale_or_bias(findings)
-    verdict = verdict_of(found, findings)
-    if verdict == "failed":
-        findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
-    causes = tuple(cause_of(found, i, findings) for i in range(len(found.tried)))
-    words = conclusions(verdict, found, findings, causes)
+    result = concluded(found, found, findings)
     if computed:
-        verdict, words = without_vane(verdict, words)
+        result = without_vane(result)
     elif chord is None:
         remarks.append(
             f"No chord is known: arms up to {LONGEST_ARM_M:g} m are allowed; --aircraft narrows them."
         )
-    return CheckResult(
-        verdict=verdict,
-        run_ids=tuple(r.run_id for r in records),
-        findings=findings,
-        causes=causes,
-        statistic=found.statistic,
-        degrees=found.degrees,
-        p_value=found.p_value,
-        enlargement=found.enlargement,
-        residual_rms=rms(found.problem, found.best.fit),
-        sentences=(*words, *remarks),
-        search=found,
-    )
+    return replace(result, sentences=(*result.sentences, *remarks))
 
 
 def _records(logs: Sequence[FlightLog]) -> tuple[list[LongitudinalSamples], list[str]]:
     """Runs worth judging, with the channels that all of them have, and remarks on absent ones."""
-    records: list[LongitudinalSamples] = []
-    runs = sum(len(log.run_ids) for log in logs)
-    optional = ("ax_m_s2", "theta_rad", *ROTATION)
-    present = {n: all(n in log.channels for log in logs) for n in optional}
-    for log in logs:
-        for run, run_id in enumerate(log.run_ids):
-            rows = log.rows(run)
-            dt = float(np.mean(np.diff(log.t_s[rows])))
-            needed = [log.channels[name][rows] for name in REQUIRED]
-            long_enough = rows.stop - rows.start >= 4 * edge_samples(butterworth(min(5.0, 0.2 / dt), 4, dt))
-            airspeed, alpha, q, az, elevator = needed
-            if not long_enough or min(np.ptp(x) for x in (elevator, q, alpha)) == 0.0:
-                continue
-            if len(records) < MOST_RECORDS:
-                further = (log.channels[n][rows] if there else None for n, there in present.items())
-                records.append(
-                    thinned(LongitudinalSamples(run_id, dt, airspeed, alpha, q, az, elevator, *further))
-                )
-    if not records:
-        raise LogError(
-            f"no run can be assessed: {runs} runs are shorter than about two seconds, or elevator, "
-            "q or alpha does not move in them; give a record with a manoeuvre"
-        )
-    remarks = []
-    if len(records) < runs:
-        remarks.append(f"{len(records)} of {runs} runs were assessed.")
-    if not present["theta_rad"]:
+
+    def record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> LongitudinalSamples | None:
+        if min(np.ptp(c[n]) for n in (*MOTION.surfaces, *MOTION.gyros, MOTION.vane)) == 0.0:
+            return None
+        further = (c.get(n) for n in ("ax_m_s2", "theta_rad", *ROTATION))
+        return thinned(LongitudinalSamples(run_id, dt_s, *(c[n] for n in MOTION.required), *further))
+
+    records, remarks = records_of(logs, record, "elevator, q or alpha does not", "a manoeuvre")
+    if records[0].theta is None:
         remarks.append(
             "theta_rad is absent: q is not assessed separately, the airspeed is not assessed, and the flight path is "
             "assumed level at the start."
         )
-    if not present["ax_m_s2"]:
+    if records[0].ax is None:
         remarks.append("ax_m_s2 is absent: the airspeed is not assessed, and ax alpha is omitted in alpha'.")
     return records, remarks
 
@@ -234,8 +198,8 @@ def _airspeed(found: ErrorSearch) -> list[Finding]:
 
 def _biases(found: ErrorSearch, known: Mapping[str, float]) -> list[Finding]:
     """Biases of gyro, az and ax from the ramps of the equations, beside the sums that known ones make there."""
-    problem, one = found.problem, found.best.fit
-    scale = dict(zip(one.names, one.value, strict=True)).get("vane_scale", problem.start("vane_scale"))
+    problem = found.problem
+    scale = found.best.fit.of("vane_scale", problem.start("vane_scale"))
     if "alpha" not in problem.equations:
         turn, turn_std = drift(found, "theta", known)
         meaning = "constant in q, by the drift of its integral from theta"

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_average import averaged
-from airtruth.checks.kinematics_bias import mean_of, ramps, ramps_of
+from airtruth.checks.kinematics_bias import mean_of, ramps, ramps_of, rms
 from airtruth.checks.kinematics_search import ErrorSearch, price
-from airtruth.checks.result import Finding, PossibleCause, State
+from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
+from airtruth.checks.result import CheckResult, Finding, PossibleCause, State
 
 Array = NDArray[np.float64]
 
@@ -92,4 +93,25 @@ def cause_of(found: ErrorSearch, place: int, findings: Sequence[Finding]) -> Pos
     )
 
 
-__all__ = ["bias_of", "cause_of", "drift", "errors_of"]
+def concluded(found: ErrorSearch, shown: ErrorSearch, findings: tuple[Finding, ...]) -> CheckResult:
+    """Verdict, causes and conclusions of a search; ``shown`` has the statistic that they state."""
+    verdict = verdict_of(shown, findings)
+    if verdict == "failed":
+        findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
+    causes = tuple(cause_of(found, i, findings) for i in range(len(found.tried)))
+    return CheckResult(
+        verdict=verdict,
+        run_ids=tuple(r.run_id for r in found.problem.records),
+        findings=findings,
+        causes=causes,
+        statistic=shown.statistic,
+        degrees=shown.degrees,
+        p_value=shown.p_value,
+        enlargement=shown.enlargement,
+        residual_rms=rms(found.problem, found.best.fit),
+        sentences=tuple(conclusions(verdict, shown, findings, causes)),
+        search=found,
+    )
+
+
+__all__ = ["bias_of", "concluded", "drift", "errors_of"]

@@ -62,6 +62,10 @@ class Fit:
         """(k,) standard errors."""
         return np.asarray(np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0)))
 
+    def of(self, name: str, otherwise: float) -> float:
+        """Value of an error; another value where it was not free."""
+        return float(self.value[self.names.index(name)]) if name in self.names else otherwise
+
     @property
     def sound(self) -> bool:
         """Whether the fit may be used: it converged inside its range."""
@@ -187,12 +191,12 @@ class KinematicProblem:
         movers = self.kinematics.moved_by.get(equation)
         return tuple(pair for pair in sorted(errors.items()) if movers is None or pair[0] in movers)
 
-    def slope(self, name: str, errors: Mapping[str, float], moments: Array) -> Array:
-        """(m,) derivative of the moments by one error; ``moments`` are those at the errors."""
+    def slope(self, name: str, errors: Mapping[str, float], there: Array) -> Array:
+        """(m,) derivative of the moments by one error; ``there`` are those at the errors."""
         value = errors.get(name, self.start(name))
         step = self.kinematics.errors[name].step
         step = step if value < self.limits[name][1] - step else -step
-        return (self.moments({**errors, name: value + step}) - moments) / step
+        return (self.moments({**errors, name: value + step}) - there) / step
 
     def linearised(self, names: Sequence[str], errors: Mapping[str, float]) -> tuple[Array, Array]:
         """(m,) moments at given errors, and (names, m) their derivatives in some of them."""

@@ -10,47 +10,37 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
-from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_energy import by_equation
-from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
+from airtruth.checks.kinematics_findings import bias_of, concluded, drift, errors_of
 from airtruth.checks.kinematics_fit import KinematicProblem, limits_of, problem_of
 from airtruth.checks.kinematics_lines import lines_of
-from airtruth.checks.kinematics_record import thinned
-from airtruth.checks.kinematics_search import DOUBT, ErrorSearch, completed, search
+from airtruth.checks.kinematics_record import LONGEST_ARM_M, USUAL_ARM_M, records_of, thinned
+from airtruth.checks.kinematics_search import DOUBT, ROUNDS, ErrorSearch, completed, search
 from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
-from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding
+from airtruth.checks.rotation import given, rates
 from airtruth.checks.samples import integral
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
-from airtruth.numerics.prefilter import butterworth, edge_samples
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.sensor_errors import error_name
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-MOST_RECORDS: Final = 20
-"""Records judged together [-]: judgement, as in the longitudinal motion."""
 LONGEST_ARM_SPANS: Final = 1.5
 """Largest arm [spans]: judgement; the nose boom of a T-38 is 1.2 spans ahead of the CG."""
-LONGEST_ARM_M: Final = 40.0
-"""Largest arm where no span is known [m]: judgement, half the length of the largest aircraft."""
 USUAL_ARM_SPANS: Final = 0.4
 """Arm that is not unusual [spans]: judgement; the nose of a transport is that far ahead."""
-USUAL_ARM_M: Final = 10.0
-"""Arm that is not unusual where no span is known [m]: judgement."""
-ROUNDS: Final = 3
-"""Largest number of searches with enlarged noise [-]: judgement; two usually suffice."""
 STEADY: Final = 0.1
 """Relative change of an enlargement below which it is settled [-]: judgement."""
-OF_EQUATION: Final = {
-    "phi": ("phi_rad", "p_rad_s"),
-    "psi": ("psi_rad", "r_rad_s"),
-    "beta": ("beta_rad", "r_rad_s", "ay_m_s2"),
-}
+_BETA, _P, _R, _PHI, _AY = MOTION.output_channels
+OF_EQUATION: Final = {"phi": (_PHI, _P), "psi": ("psi_rad", _R), "beta": (_BETA, _R, _AY)}
 """Equation -> channels whose errors it shows."""
-BY_GUSTS: Final = ("gyro_scale:r_rad_s", "accelerometer_scale:ay_m_s2")
+BY_GUSTS: Final = (error_name(_R, "scale"), error_name(_AY, "scale"))
 """Errors that a gust at the vane hides."""
-ARMS: Final = ("vane_arm:beta_rad", "accelerometer_arm:ay_m_s2")
+ARMS: Final = (error_name(_BETA, "arm"), error_name(_AY, "arm"))
 """Errors that enter as their difference."""
 
 
@@ -86,24 +76,9 @@ def check_lateral(
     problem = problem_of(records, equations, known, limits, kinematics=LATERAL)
     found, shown = _searched(problem, usual)
     findings = (*errors_of(found, usual), *_biases(found, biases or {}))
-    verdict = verdict_of(shown, findings)
-    if verdict == "failed":
-        findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
-    causes = tuple(cause_of(found, i, findings) for i in range(len(found.tried)))
-    words = [*conclusions(verdict, shown, findings, causes), *_of_arms(findings, known), *_of_gusts(findings)]
-    return CheckResult(
-        verdict=verdict,
-        run_ids=tuple(r.run_id for r in records),
-        findings=findings,
-        causes=causes,
-        statistic=shown.statistic,
-        degrees=shown.degrees,
-        p_value=shown.p_value,
-        enlargement=shown.enlargement,
-        residual_rms=rms(found.problem, found.best.fit),
-        sentences=(*words, *remarks),
-        search=found,
-    )
+    result = concluded(found, shown, findings)
+    further = (*_of_arms(findings, known), *_of_gusts(findings), *remarks)
+    return replace(result, sentences=(*result.sentences, *further))
 
 
 def _searched(problem: KinematicProblem, usual: Mapping[str, float]) -> tuple[ErrorSearch, ErrorSearch]:
@@ -143,9 +118,9 @@ def _searched(problem: KinematicProblem, usual: Mapping[str, float]) -> tuple[Er
     )
 
 
-_NEEDED: Final = ("airspeed_m_s", "p_rad_s", "r_rad_s", "ay_m_s2")
+_NEEDED: Final = tuple(n for n in MOTION.required if n not in MOTION.surfaces)
 """Channels of every lateral record."""
-_INPUTS: Final = ("alpha_rad", "theta_rad", "q_rad_s")
+_INPUTS: Final = (LONGITUDINAL.vane, "theta_rad", *LONGITUDINAL.gyros)
 """Channels of the other motion that are known inputs."""
 
 
@@ -159,42 +134,25 @@ def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]
     """
     shared = set.intersection(*(set(log.channels) for log in logs))
     missing = [n for n in _NEEDED if n not in shared]
-    if missing or not {"aileron_rad", "rudder_rad"} & shared or not set(LATERAL.channels.values()) & shared:
-        wanted = missing or ["aileron_rad or rudder_rad, and beta_rad, phi_rad or psi_rad"]
+    if missing or not shared & set(MOTION.surfaces) or not set(LATERAL.channels.values()) & shared:
+        wanted = missing or [f"{' or '.join(MOTION.surfaces)}, and beta_rad, phi_rad or psi_rad"]
         raise LogError(
             f"the lateral motion cannot be assessed: {', '.join(wanted)} is missing; map it on import"
         )
-    records: list[SideRecord] = []
-    runs = sum(len(log.run_ids) for log in logs)
-    for log in logs:
-        for run, run_id in enumerate(log.run_ids):
-            rows = log.rows(run)
-            dt = float(np.mean(np.diff(log.t_s[rows])))
-            c = {n: log.channels[n][rows] for n in shared}
-            long_enough = rows.stop - rows.start >= 4 * edge_samples(butterworth(min(5.0, 0.2 / dt), 4, dt))
-            moved = max(np.ptp(c[n]) for n in ("aileron_rad", "rudder_rad") if n in c)
-            if long_enough and min(moved, np.ptp(c["p_rad_s"]), np.ptp(c["r_rad_s"])) > 0.0:
-                record = thinned(_record(run_id, dt, c))
-                records += [record] if _shows_noise(record) else []
-    if not records:
-        raise LogError(
-            f"no run can be assessed: {runs} runs are shorter than about two seconds, or aileron and rudder, p or r "
-            "do not move in them; give a record with a manoeuvre of roll and yaw"
-        )
-    remarks = []
-    if min(len(records), MOST_RECORDS) < runs:
-        remarks.append(f"{min(len(records), MOST_RECORDS)} of {runs} runs were assessed.")
+    records, remarks = records_of(
+        logs, _record, "aileron and rudder, p or r do not", "a manoeuvre of roll and yaw"
+    )
     absent = [n for n in _INPUTS if n not in shared]
     if absent:
         remarks.append(f"{', '.join(absent)} is absent: zero is taken, a constant of alpha is free.")
     for channel, loss in (
-        ("beta_rad", "the vane, r and ay are not assessed"),
-        ("phi_rad", "p is not assessed, and the bank is the integral of p"),
+        (_BETA, "the vane, r and ay are not assessed"),
+        (_PHI, "p is not assessed, and the bank is the integral of p"),
         ("psi_rad", "r is assessed by sideslip alone"),
     ):
         if channel not in shared:
             remarks.append(f"{channel} is absent: {loss}.")
-    return records[:MOST_RECORDS], remarks
+    return records, remarks
 
 
 def _shows_noise(record: SideRecord) -> bool:
@@ -203,31 +161,39 @@ def _shows_noise(record: SideRecord) -> bool:
     return bool(lines.keep.size > len(lines.basis) + len(lines.trends))
 
 
-def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord:
-    def given(name: str) -> Array:
-        return c[name] if name in c else np.zeros_like(c["p_rad_s"])
-
-    alpha = given("alpha_rad")
-    path = given("ax_m_s2") * np.cos(alpha) + given("az_m_s2") * np.sin(alpha)
+def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord | None:
+    """The record of a run; None where nothing moves but noise."""
+    moved = max(np.ptp(c[n]) for n in MOTION.surfaces if n in c)
+    if min(moved, *(np.ptp(c[n]) for n in MOTION.gyros)) == 0.0:
+        return None
+    airspeed, p, r, ay = (c[n] for n in _NEEDED)
+    _, q, _, _, theta = rates(c)
+    alpha = given(c, LONGITUDINAL.vane)
+    aileron, rudder = (given(c, n) for n in MOTION.surfaces)
+    forward, normal = "ax_m_s2", LONGITUDINAL.outputs[-1].channel
+    path = given(c, forward) * np.cos(alpha) + given(c, normal) * np.sin(alpha)
     phi, psi = (np.unwrap(c[n]) if n in c else None for n in ("phi_rad", "psi_rad"))
-    return SideRecord(
-        run_id=run_id,
-        dt_s=dt_s,
-        airspeed=c["airspeed_m_s"],
-        p=c["p_rad_s"],
-        r=c["r_rad_s"],
-        ay=c["ay_m_s2"],
-        aileron=given("aileron_rad"),
-        rudder=given("rudder_rad"),
-        alpha=alpha,
-        theta=given("theta_rad") if "theta_rad" in c else alpha,
-        q=given("q_rad_s"),
-        bank=integral(c["p_rad_s"], dt_s) if phi is None else phi,
-        path=path if "ax_m_s2" in c and "az_m_s2" in c else np.zeros_like(path),
-        phi=phi,
-        psi=psi,
-        beta=c.get("beta_rad"),
+    record = thinned(
+        SideRecord(
+            run_id=run_id,
+            dt_s=dt_s,
+            airspeed=airspeed,
+            p=p,
+            r=r,
+            ay=ay,
+            aileron=aileron,
+            rudder=rudder,
+            alpha=alpha,
+            theta=theta if "theta_rad" in c else alpha,
+            q=q,
+            bank=integral(p, dt_s) if phi is None else phi,
+            path=path if {forward, normal} <= c.keys() else np.zeros_like(path),
+            phi=phi,
+            psi=psi,
+            beta=c.get(MOTION.vane),
+        )
     )
+    return record if _shows_noise(record) else None
 
 
 def _candidates(
@@ -248,8 +214,8 @@ def _biases(found: ErrorSearch, known: Mapping[str, float]) -> list[Finding]:
     """Biases of p, r and ay from the ramps of the equations, beside the sums that known ones make there."""
     problem = found.problem
     meanings = {
-        "phi": ("gyro_bias:p_rad_s", "constant in p, by the drift of its integral from phi"),
-        "psi": ("gyro_bias:r_rad_s", "constant in r, by the drift of its integral from psi"),
+        "phi": (f"gyro_bias:{_P}", "constant in p, by the drift of its integral from phi"),
+        "psi": (f"gyro_bias:{_R}", "constant in r, by the drift of its integral from psi"),
     }
     drifts = {equation: drift(found, equation, known) for equation in problem.equations}
     result = []
@@ -259,14 +225,13 @@ def _biases(found: ErrorSearch, known: Mapping[str, float]) -> list[Finding]:
             result.append(bias_of(found, name, "rad/s", meaning, -ramp, std))
     if "beta" not in drifts:
         return result
-    scale = dict(zip(found.best.fit.names, found.best.fit.value, strict=True)).get(
-        "vane_scale:beta_rad", problem.start("vane_scale:beta_rad")
-    )
+    scale = found.best.fit.of(vane := error_name(_BETA, "scale"), problem.start(vane))
     speed = float(np.mean([r.channel("airspeed") for r in problem.records[:1]]))
-    ramp, std = (x / scale for x in drifts["beta"])
+    ramp, std = drifts["beta"]
+    ramp, std = ramp / scale, std / scale
     if "psi" not in drifts:
         meaning = "constants in r, ay and phi, which psi would separate"
-        return [*result, bias_of(found, "gyro_bias:r_rad_s", "rad/s", meaning, ramp, std)]
+        return [*result, bias_of(found, meanings["psi"][0], "rad/s", meaning, ramp, std)]
     alpha = float(np.mean([r.channel("alpha") for r in problem.records[:1]]))
     yaw, yaw_std = drifts["psi"]
     roll, roll_std = drifts.get("phi", (np.zeros(2), 0.0))
@@ -274,7 +239,7 @@ def _biases(found: ErrorSearch, known: Mapping[str, float]) -> list[Finding]:
     side = speed * (-ramp + roll * np.sin(alpha) - yaw * np.cos(alpha))
     spread = speed * float(np.sqrt(std**2 + (yaw_std * np.cos(alpha)) ** 2 + (roll_std * np.sin(alpha)) ** 2))
     meaning = f"constant in ay, and {G0:.3g} m/s2 per rad of a constant in phi, by the drift of beta: one does not show the other"
-    return [*result, bias_of(found, "accelerometer_bias:ay_m_s2", "m/s2", meaning, side, spread)]
+    return [*result, bias_of(found, f"accelerometer_bias:{_AY}", "m/s2", meaning, side, spread)]
 
 
 def _of_arms(findings: Sequence[Finding], known: Mapping[str, float]) -> list[str]:

@@ -26,14 +26,16 @@ from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_record import InstrumentError, Kinematics, Samples, stacked, thinned
 from airtruth.checks.pitch_motions import pitch_motions
-from airtruth.checks.rotation import alpha_coupling, pitch_coupling
+from airtruth.checks.rotation import across_flow, alpha_coupling, pitch_coupling
 from airtruth.checks.samples import derivative, earlier, integral, lagged
+from airtruth.physics.motion import LONGITUDINAL as MOTION
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
 from airtruth.physics.sensors import vane_equation
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
+_ALPHA, _Q, _AZ = MOTION.output_channels
 EQUATIONS: Final = ("theta", "alpha", "airspeed")
 """Equations that are integrated, by the channel that they predict."""
 
@@ -84,25 +86,25 @@ class LongitudinalSamples(Samples):
 
 
 _ALL: Final = (
-    InstrumentError("q_rad_s", "scale", 0.05, 1e-3, "measured over true q"),
-    InstrumentError("q_rad_s", "lag", 0.1, 1e-3, "time constant of the gyro"),
-    InstrumentError("q_rad_s", "delay", 0.1, 1e-3, "delay of q against the other channels"),
+    InstrumentError(_Q, "scale", 0.05, 1e-3, "measured over true q"),
+    InstrumentError(_Q, "lag", 0.1, 1e-3, "time constant of the gyro"),
+    InstrumentError(_Q, "delay", 0.1, 1e-3, "delay of q against the other channels"),
     InstrumentError(
         "theta_rad", "lag", 0.1, 1e-3, "time constant of the attitude: its gain falls with frequency"
     ),
     InstrumentError("theta_rad", "delay", 0.1, 1e-3, "delay of theta against q"),
-    InstrumentError("alpha_rad", "scale", 0.1, 1e-3, "measured over true alpha"),
-    InstrumentError("az_m_s2", "scale", 0.05, 1e-3, "measured over true az"),
+    InstrumentError(_ALPHA, "scale", 0.1, 1e-3, "measured over true alpha"),
+    InstrumentError(_AZ, "scale", 0.05, 1e-3, "measured over true az"),
     InstrumentError("airspeed_m_s", "scale", 0.1, 1e-3, "measured over true airspeed"),
     InstrumentError(
-        "alpha_rad", "arm", 3.0, 1e-2, "position of the vane ahead of the CG: alpha_vane = alpha - q x/V"
+        _ALPHA, "arm", 3.0, 1e-2, "position of the vane ahead of the CG: alpha_vane = alpha - q x/V"
     ),
-    InstrumentError("alpha_rad", "lag", 0.3, 1e-3, "time constant of the vane"),
+    InstrumentError(_ALPHA, "lag", 0.3, 1e-3, "time constant of the vane"),
     InstrumentError(
-        "az_m_s2", "arm", 3.0, 1e-2, "position of the accelerometer ahead of the CG: az = az_cg - x q_dot"
+        _AZ, "arm", 3.0, 1e-2, "position of the accelerometer ahead of the CG: az = az_cg - x q_dot"
     ),
-    InstrumentError("alpha_rad", "delay", 0.2, 1e-3, "delay of alpha against q and az"),
-    InstrumentError("az_m_s2", "delay", 0.1, 1e-3, "delay of az against the other channels"),
+    InstrumentError(_ALPHA, "delay", 0.2, 1e-3, "delay of alpha against q and az"),
+    InstrumentError(_AZ, "delay", 0.1, 1e-3, "delay of az against the other channels"),
     InstrumentError("airspeed_m_s", "delay", 0.3, 1e-3, "delay of airspeed against ax and theta"),
     InstrumentError(
         "airspeed_m_s", "alpha_slope", 0.3, 1e-3, "relative change of the airspeed with alpha about its mean"
@@ -132,7 +134,7 @@ def compare(
     def error(channel: str, kind: Kind) -> float:
         return float(errors.get(error_name(channel, kind), KINDS[kind].neutral))
 
-    q_lag, q_delay, q_scale = (error("q_rad_s", k) for k in ("lag", "delay", "scale"))
+    q_lag, q_delay, q_scale = (error(_Q, k) for k in ("lag", "delay", "scale"))
     turned = earlier(record.turned + q_lag * (record.q - record.q[..., :1]), dt, q_delay) / q_scale
     result = {}
     if record.theta is not None:
@@ -143,27 +145,27 @@ def compare(
     q = earlier(record.q + q_lag * record.q_dot, dt, q_delay) / q_scale
     # the mean of alpha stays, because a constant of it is not determined
     middle = _mean(record.alpha)
-    swing = (record.alpha - middle) / error("alpha_rad", "scale")
+    swing = (record.alpha - middle) / error(_ALPHA, "scale")
     slope = 1.0 + error("airspeed_m_s", "alpha_slope") * swing
     airspeed = record.airspeed / (error("airspeed_m_s", "scale") * slope)
-    az = earlier(record.az, dt, error("az_m_s2", "delay")) / error("az_m_s2", "scale")
-    arm = error("az_m_s2", "arm")
+    az = earlier(record.az, dt, error(_AZ, "delay")) / error(_AZ, "scale")
+    arm = error(_AZ, "arm")
     ax = record.ax if record.ax is not None else 0.0
     if record.theta is None:
         theta = middle + turned - _mean(turned) - (_mean(q) - _mean(record.q)) * record.t
     else:
         theta = earlier(record.theta, dt, error("theta_rad", "delay")) + error("theta_rad", "lag") * q
-    alpha = swing + middle + error("alpha_rad", "arm") * q / record.airspeed
-    force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha)
+    alpha = swing + middle + error(_ALPHA, "arm") * q / record.airspeed
+    force = across_flow(az, ax, alpha, theta)
     # the integral of x q_dot/V is x q/V up to the change of V, which does not matter over a manoeuvre
     turning = turned + arm * (q - q[..., :1]) / airspeed + integral(force / airspeed, dt)
     if record.rotated is not None:
         turning = turning + record.rotated[1]
-    vane = vane_equation(turning, q, error("alpha_rad", "arm"), airspeed)
-    vane = _late(vane, dt, error("alpha_rad", "delay"), error("alpha_rad", "lag"))
-    result["alpha"] = record.alpha - error("alpha_rad", "scale") * vane
+    vane = vane_equation(turning, q, error(_ALPHA, "arm"), airspeed)
+    vane = _late(vane, dt, error(_ALPHA, "delay"), error(_ALPHA, "lag"))
+    result["alpha"] = record.alpha - error(_ALPHA, "scale") * vane
     if record.ax is not None and record.theta is not None and "airspeed" in equations:
-        lead = error("alpha_rad", "lag") + error("alpha_rad", "delay")
+        lead = error(_ALPHA, "lag") + error(_ALPHA, "delay")
         alpha = alpha + lead * (q + force / airspeed)
         rate = ax * np.cos(alpha) + (az + arm * record.q_dot) * np.sin(alpha) - G0 * np.sin(theta - alpha)
         late = earlier(integral(rate, dt), dt, -error("airspeed_m_s", "delay"))
@@ -182,15 +184,9 @@ def _late(x: Array, dt_s: float, delay_s: float, lag_s: float) -> Array:
 
 LONGITUDINAL: Final = Kinematics(
     errors=ERRORS,
-    channels={"theta": "theta_rad", "alpha": "alpha_rad", "airspeed": "airspeed_m_s"},
-    fields={
-        "airspeed_m_s": "airspeed",
-        "alpha_rad": "alpha",
-        "theta_rad": "theta",
-        "q_rad_s": "q",
-        "ax_m_s2": "ax",
-        "az_m_s2": "az",
-    },
+    channels={"theta": "theta_rad", "alpha": _ALPHA, "airspeed": "airspeed_m_s"},
+    fields={"airspeed_m_s": "airspeed", "theta_rad": "theta", "ax_m_s2": "ax"}
+    | {y.channel: y.name for y in MOTION.outputs},
     compare=compare,
     motions=lambda record: pitch_motions(record.elevator, record.q, record.dt_s),
     controls="the elevator",

@@ -1,4 +1,4 @@
-"""Records of a kinematic check: channels of one run, several runs side by side, thinning; and what a check knows of an axis."""
+"""Records of a kinematic check: runs worth judging, several of them side by side, thinning; and what a check knows of an axis."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.numerics.prefilter import butterworth, zero_phase
+from airtruth.checks.pitch_motions import smoothing
+from airtruth.errors import LogError
+from airtruth.logs.flight_log import FlightLog
+from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
 from airtruth.units import UNITS, printed
 
@@ -22,6 +25,12 @@ _KEPT: Final = 8
 """Number of values of one name that are kept [-] (judgement: a step of a fit moves up to four errors, one after the other)."""
 RATE_HZ: Final = 25.0
 """Smallest sample rate after thinning [Hz]: judgement; the motion of an aircraft lies below 5 Hz."""
+MOST_RECORDS: Final = 20
+"""Records judged together [-]: judgement; more add little, and time grows with them."""
+LONGEST_ARM_M: Final = 40.0
+"""Largest arm where no reference length is known [m]: judgement, half the length of the largest aircraft."""
+USUAL_ARM_M: Final = 10.0
+"""Arm that is not unusual where no reference length is known [m]: judgement."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +94,43 @@ class Samples:
 
 
 R = TypeVar("R", bound=Samples)
+
+
+def records_of(
+    logs: Sequence[FlightLog],
+    make: Callable[[str, float, Mapping[str, Array]], R | None],
+    still: str,
+    manoeuvre: str,
+) -> tuple[list[R], list[str]]:
+    """The first `MOST_RECORDS` runs worth judging, and a remark if there are more runs.
+
+    Parameters
+    ----------
+    logs : flight logs.
+    make : name, sample period [s] and the channels that all logs have -> thinned record; None where nothing moves.
+    still : what does not move, and ``manoeuvre`` : what would help, in the message.
+
+    Raises
+    ------
+    LogError
+        If no run is long enough and moves.
+    """
+    shared = set.intersection(*(set(log.channels) for log in logs))
+    runs = [(log, run) for log in logs for run in range(len(log.run_ids))]
+    records: list[R] = []
+    for log, run in runs:
+        rows = log.rows(run)
+        dt = float(np.mean(np.diff(log.t_s[rows])))
+        if len(records) < MOST_RECORDS and rows.stop - rows.start >= 4 * edge_samples(smoothing(dt)):
+            record = make(log.run_ids[run], dt, {n: log.channels[n][rows] for n in shared})
+            records += [] if record is None else [record]
+    if not records:
+        raise LogError(
+            f"no run can be assessed: {len(runs)} runs are shorter than about two seconds, or {still} move in them; "
+            f"give a record with {manoeuvre}"
+        )
+    many = len(records) < len(runs)
+    return records, [f"{len(records)} of {len(runs)} runs were assessed."] if many else []
 
 
 def stacked(records: Sequence[R]) -> list[tuple[tuple[int, ...], R]]:
@@ -214,13 +260,17 @@ def declared_biases(aircraft: Aircraft, kinematics: Kinematics) -> dict[str, flo
 
 
 __all__ = [
+    "LONGEST_ARM_M",
+    "MOST_RECORDS",
     "RATE_HZ",
+    "USUAL_ARM_M",
     "InstrumentError",
     "Kinematics",
     "R",
     "Samples",
     "declared_biases",
     "declared_errors",
+    "records_of",
     "stacked",
     "thinned",
 ]

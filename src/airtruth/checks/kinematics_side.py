@@ -21,11 +21,14 @@ from airtruth.checks.lateral_model import fitted, simulated
 from airtruth.checks.pitch_motions import smoothed_surface
 from airtruth.checks.rotation import bank_coupling, heading_rate, side_gravity, sideslip_turn
 from airtruth.checks.samples import derivative, earlier, integral, lagged
-from airtruth.physics.sensor_errors import Kind
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.sensor_errors import Kind, error_name
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
+_BETA, _P, _R, _PHI, _AY = MOTION.output_channels
 EQUATIONS: Final = ("phi", "psi", "beta")
 """Equations that are integrated, by the channel that they predict."""
 ALPHA_BIAS: Final = "vane_bias"
@@ -77,28 +80,28 @@ class SideRecord(Samples):
 
 
 _ALL: Final = (
-    InstrumentError("p_rad_s", "scale", 0.05, 1e-3, "measured over true p"),
-    InstrumentError("p_rad_s", "lag", 0.1, 1e-3, "time constant of the gyro"),
-    InstrumentError("p_rad_s", "delay", 0.1, 1e-3, "delay of p against the other channels"),
-    InstrumentError("r_rad_s", "scale", 0.05, 1e-3, "measured over true r"),
-    InstrumentError("r_rad_s", "lag", 0.1, 1e-3, "time constant of the gyro"),
-    InstrumentError("r_rad_s", "delay", 0.1, 1e-3, "delay of r against the other channels"),
-    InstrumentError("phi_rad", "delay", 0.1, 1e-3, "delay of phi against p"),
+    InstrumentError(_P, "scale", 0.05, 1e-3, "measured over true p"),
+    InstrumentError(_P, "lag", 0.1, 1e-3, "time constant of the gyro"),
+    InstrumentError(_P, "delay", 0.1, 1e-3, "delay of p against the other channels"),
+    InstrumentError(_R, "scale", 0.05, 1e-3, "measured over true r"),
+    InstrumentError(_R, "lag", 0.1, 1e-3, "time constant of the gyro"),
+    InstrumentError(_R, "delay", 0.1, 1e-3, "delay of r against the other channels"),
+    InstrumentError(_PHI, "delay", 0.1, 1e-3, "delay of phi against p"),
     InstrumentError("psi_rad", "delay", 0.1, 1e-3, "delay of psi against r"),
-    InstrumentError("beta_rad", "scale", 0.1, 1e-3, "measured over true beta, sidewash included"),
+    InstrumentError(_BETA, "scale", 0.1, 1e-3, "measured over true beta, sidewash included"),
     InstrumentError(
-        "beta_rad", "arm", 3.0, 1e-2, "position of the vane ahead of the CG: beta_vane = beta + x r/V"
+        _BETA, "arm", 3.0, 1e-2, "position of the vane ahead of the CG: beta_vane = beta + x r/V"
     ),
-    InstrumentError("beta_rad", "lag", 0.3, 1e-3, "time constant of the vane"),
-    InstrumentError("beta_rad", "delay", 0.2, 1e-3, "delay of beta against r and ay"),
-    InstrumentError("ay_m_s2", "scale", 0.05, 1e-3, "measured over true ay"),
+    InstrumentError(_BETA, "lag", 0.3, 1e-3, "time constant of the vane"),
+    InstrumentError(_BETA, "delay", 0.2, 1e-3, "delay of beta against r and ay"),
+    InstrumentError(_AY, "scale", 0.05, 1e-3, "measured over true ay"),
     InstrumentError(
-        "ay_m_s2", "arm", 3.0, 1e-2, "position of the accelerometer ahead of the CG: ay = ay_cg + x r_dot"
+        _AY, "arm", 3.0, 1e-2, "position of the accelerometer ahead of the CG: ay = ay_cg + x r_dot"
     ),
     InstrumentError(
-        "ay_m_s2", "arm_down", 1.0, 1e-2, "position of the accelerometer below the CG: ay = ay_cg - z p_dot"
+        _AY, "arm_down", 1.0, 1e-2, "position of the accelerometer below the CG: ay = ay_cg - z p_dot"
     ),
-    InstrumentError("ay_m_s2", "delay", 0.1, 1e-3, "delay of ay against the other channels"),
+    InstrumentError(_AY, "delay", 0.1, 1e-3, "delay of ay against the other channels"),
 )
 """Each error with its usual size and the step of its derivative (judgement, as in the longitudinal motion)."""
 ERRORS: Final[dict[str, InstrumentError]] = {error.name: error for error in _ALL}
@@ -132,9 +135,9 @@ def compare(
         return record.kept(channel, at, lambda: earlier(x + lag * dot, dt, delay) / scale)
 
     p_dot, r_dot = record.dots
-    p, r = rate("p_rad_s", record.p, p_dot), rate("r_rad_s", record.r, r_dot)
-    of_p, of_r = of("p_rad_s", *_GYRO), of("r_rad_s", *_GYRO)
-    (phi_late,) = of_phi = of("phi_rad", "delay")
+    p, r = rate(_P, record.p, p_dot), rate(_R, record.r, r_dot)
+    of_p, of_r = of(_P, *_GYRO), of(_R, *_GYRO)
+    (phi_late,) = of_phi = of(_PHI, "delay")
     bank = record.kept("bank", of_phi, lambda: earlier(record.bank, dt, phi_late))
     result = {}
     if "phi" in equations and record.phi is not None:
@@ -153,7 +156,7 @@ def compare(
         result["psi"] = record.psi - earlier(yawed, dt, -of("psi_rad", "delay")[0])
     if "beta" in equations and (beta := record.beta) is not None:
         of_air = tuple(float(errors.get(name, 0.0)) for name in (ALPHA_BIAS, ALPHA_DRIFT))
-        of_ay = of("ay_m_s2", "delay", "scale", "arm", "arm_down")
+        of_ay = of(_AY, "delay", "scale", "arm", "arm_down")
         turned = record.kept(
             "turned",
             of_p + of_r + of_phi + of_air + of_ay,
@@ -167,7 +170,7 @@ def compare(
                 of_ay,
             ),
         )
-        scale, arm, lag, delay = of("beta_rad", "scale", "arm", "lag", "delay")
+        scale, arm, lag, delay = of(_BETA, "scale", "arm", "lag", "delay")
         vane = lagged(earlier(turned + arm * r / record.airspeed, dt, -delay), dt, lag)
         result["beta"] = beta - scale * vane
     return result
@@ -214,11 +217,12 @@ def motions(record: SideRecord) -> Array:
     """
     dt = record.dt_s
     beta = record.beta if record.beta is not None else record.bank
-    channels = {"beta_rad": beta, "p_rad_s": record.p, "r_rad_s": record.r, "phi_rad": record.bank}
-    surfaces = {"aileron_rad": record.aileron, "rudder_rad": record.rudder}
-    every = {n: x[None] for n, x in (channels | surfaces).items()}
-    a, b = fitted(every, dt, tuple(channels), tuple(surfaces))
-    smooth = np.stack([smoothed_surface(x, dt) for x in surfaces.values()])
+    states, surfaces = tuple(s.channel for s in MOTION.states), MOTION.surfaces
+    deflections = (record.aileron, record.rudder)
+    values = (beta, record.p, record.r, record.bank, *deflections)
+    every = {n: x[None] for n, x in zip((*states, *surfaces), values, strict=True)}
+    a, b = fitted(every, dt, states, surfaces)
+    smooth = np.stack([smoothed_surface(x, dt) for x in deflections])
     each = [simulated(a, b[:, [i]], smooth[None, [i]], dt)[0] for i in range(len(surfaces))]
     whole = each[0] + each[1]
     unit = 1.0 / max(float(np.abs(np.linalg.eigvals(a).imag).max()), 0.1)
@@ -235,31 +239,21 @@ def _errors_of(*channels: str) -> frozenset[str]:
 
 LATERAL: Final = Kinematics(
     errors=ERRORS,
-    channels={"phi": "phi_rad", "psi": "psi_rad", "beta": "beta_rad"},
-    fields={
-        "airspeed_m_s": "airspeed",
-        "p_rad_s": "p",
-        "r_rad_s": "r",
-        "ay_m_s2": "ay",
-        "alpha_rad": "alpha",
-        "theta_rad": "theta",
-        "q_rad_s": "q",
-        "phi_rad": "phi",
-        "psi_rad": "psi",
-        "beta_rad": "beta",
-    },
+    channels={"phi": _PHI, "psi": "psi_rad", "beta": _BETA},
+    fields={"airspeed_m_s": "airspeed", "theta_rad": "theta", "psi_rad": "psi"}
+    | {y.channel: y.name for y in (*MOTION.outputs, *LONGITUDINAL.outputs) if not y.late or y.channel == _AY},
     compare=compare,
     motions=motions,
     controls="aileron and rudder",
-    same=(frozenset({"vane_arm:beta_rad", "accelerometer_arm:ay_m_s2"}),),
-    telling={"vane_scale:beta_rad": 0.15, "vane_lag:beta_rad": 0.1},
+    same=(frozenset({error_name(_BETA, "arm"), error_name(_AY, "arm")}),),
+    telling={error_name(_BETA, "scale"): 0.15, error_name(_BETA, "lag"): 0.1},
     most=4,
     trends=2,
     offsets={ALPHA_BIAS: 1e-3, ALPHA_DRIFT: 1e-4},
     common=True,
     moved_by={
-        "phi": _errors_of("p_rad_s", "r_rad_s", "phi_rad"),
-        "psi": _errors_of("r_rad_s", "phi_rad", "psi_rad"),
+        "phi": _errors_of(_P, _R, _PHI),
+        "psi": _errors_of(_R, _PHI, "psi_rad"),
         "beta": frozenset(ERRORS) - _errors_of("psi_rad") | {ALPHA_BIAS, ALPHA_DRIFT},
     },
 )

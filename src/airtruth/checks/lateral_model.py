@@ -8,20 +8,15 @@ of the model makes the instruments weaker, not wrong (P. C. Young, *Recursive Es
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from airtruth.checks.spectra import integral, regress, spectrum
+from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
-
-STATES: Final = ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad")
-"""Channels of the states, those of them that are recorded."""
-SURFACES: Final = ("aileron_rad", "rudder_rad")
-"""Channels of the inputs, those of them that are recorded and move."""
 
 
 def fitted(
@@ -63,10 +58,11 @@ def simulated(a: Array, b: Array, inputs: Array, dt_s: float) -> Array:
 
 
 def driven(channels: Mapping[str, Array], dt_s: float) -> tuple[tuple[str, ...], Array]:
-    """Names of the states and their motion (runs, states, samples) by the surfaces together."""
-    states, surfaces = (tuple(n for n in group if n in channels) for group in (STATES, SURFACES))
+    """Names of the recorded states and their motion (runs, states, samples) by the recorded surfaces together."""
+    states = tuple(s.channel for s in LATERAL.states if s.channel in channels)
+    surfaces = tuple(n for n in LATERAL.surfaces if n in channels)
     a, b = fitted(channels, dt_s, states, surfaces)
     return states, simulated(a, b, np.stack([channels[n] for n in surfaces], axis=1), dt_s)
 
 
-__all__ = ["STATES", "SURFACES", "driven", "fitted", "simulated"]
+__all__ = ["driven", "fitted", "simulated"]

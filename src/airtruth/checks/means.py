@@ -12,6 +12,7 @@ from airtruth.channels import SIGNALS
 from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite, informed_everywhere
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
@@ -21,7 +22,7 @@ OUTSIDE: Final = 1000.0
 """Distance of a channel that leaves the range of flight [-]; larger than any sum of the others that matters."""
 LIMITS: Final = {
     **{name: (-one.limit, one.limit) for name, one in SIGNALS.items()},
-    **dict.fromkeys(("elevator_rad", "aileron_rad", "rudder_rad"), (-45.0 * DEG, 45.0 * DEG)),
+    **dict.fromkeys((n for m in MOTIONS.values() for n in m.surfaces), (-45.0 * DEG, 45.0 * DEG)),
     "throttle": (-0.05, 1.05),
 }
 """Range of every sample, SI (judgement: no aircraft leaves it; one degree taken as one radian usually does)."""
@@ -105,7 +106,8 @@ SPREAD_LIMIT: Final = 1.0
 """Multiples of the standard deviation of a detrended channel by which the slope between its ends may err [-]."""
 
 
-PATH: Final = ("az_m_s2", "theta_rad", "alpha_rad", "airspeed_m_s", "q_rad_s")
+_ALPHA, _Q, _AZ = LONGITUDINAL.output_channels
+PATH: Final = (_AZ, "theta_rad", _ALPHA, "airspeed_m_s", _Q)
 """Channels of the test "az_mean"."""
 
 
@@ -119,18 +121,18 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
     level : (runs,) whether the wings are known to be level; None if nothing is known.
     """
     names = set(runs.channels)
-    if not {"airspeed_m_s", "q_rad_s", "az_m_s2"} <= names:
+    if not {"airspeed_m_s", _Q, _AZ} <= names:
         return []
-    vane = "alpha_rad" in names
+    vane = _ALPHA in names
 
     def required_az(c: Channels, dt_s: float) -> Array:
         """Mean of az, the required one, and its standard deviation beside that of the load."""
-        v, q, theta = c["airspeed_m_s"], c["q_rad_s"], c.get("theta_rad")
+        v, q, theta = c["airspeed_m_s"], c[_Q], c.get("theta_rad")
         speed = v.mean(axis=1)
         if not vane:
             gravity = -G0 * np.cos(theta if theta is not None else np.zeros_like(q)).mean(axis=1)
-            return np.stack([c["az_m_s2"].mean(axis=1), gravity, np.zeros_like(speed)], axis=1)
-        alpha = c["alpha_rad"]
+            return np.stack([c[_AZ].mean(axis=1), gravity, np.zeros_like(speed)], axis=1)
+        alpha = c[_ALPHA]
         path = theta - alpha if theta is not None else np.zeros_like(alpha)
         phi = c.get("phi_rad")
         upright = np.cos(path) if phi is None else np.cos(path) * np.cos(phi)
@@ -143,7 +145,7 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
         required = -G0 * upright.mean(axis=1) + speed * (turn - pitch)
         path_std = PATH_SHARE * speed * np.abs(turn - pitch)
         std = np.sqrt((speed * gyro_std) ** 2 + (speed * turn_std) ** 2 + path_std**2)
-        return np.stack([c["az_m_s2"].mean(axis=1), required, std], axis=1)
+        return np.stack([c[_AZ].mean(axis=1), required, std], axis=1)
 
     mean, required, std = runs.each(required_az).T
     turning = (mean < required) if level is None else (mean < required) & ~level
@@ -153,14 +155,14 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
     if {"theta_rad", "ax_m_s2"} <= names:
 
         def required_ax(c: Channels, dt_s: float) -> Array:
-            v, q, theta = c["airspeed_m_s"], c["q_rad_s"], c["theta_rad"]
-            alpha = c["alpha_rad"] if vane else np.zeros_like(v)
+            v, q, theta = c["airspeed_m_s"], c[_Q], c["theta_rad"]
+            alpha = c[_ALPHA] if vane else np.zeros_like(v)
             rate, rate_std = _slope(v * np.cos(alpha), dt_s)
             required = rate + (G0 * np.sin(theta) + q * v * np.sin(alpha)).mean(axis=1)
             return np.stack([c["ax_m_s2"].mean(axis=1), required, np.hypot(rate_std, rate)], axis=1)
 
         mean, required, std = runs.each(required_ax).T
-        channels = ("ax_m_s2", "theta_rad", "alpha_rad", "q_rad_s", "airspeed_m_s")
+        channels = ("ax_m_s2", "theta_rad", _ALPHA, _Q, "airspeed_m_s")
         used = tuple(name for name in channels if name in names)
         result.append(
             mean_test("ax_mean", used, mean, required, np.hypot(AXIAL_STD_M_S2, std), AXIAL_STD_M_S2)

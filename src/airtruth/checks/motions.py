@@ -13,6 +13,7 @@ from airtruth.checks.excitation import moves, turns
 from airtruth.checks.gate import admit
 from airtruth.checks.kinematics import check_kinematics
 from airtruth.checks.kinematics_record import declared_biases, declared_errors
+from airtruth.checks.kinematics_vaneless import untestable
 from airtruth.checks.result import CheckResult
 from airtruth.errors import LogError, choices
 from airtruth.logs.flight_log import FlightLog
@@ -30,7 +31,7 @@ def unsupported(log: FlightLog, motion: Motion) -> str:
     missing = missing_channels(log, motion)
     if missing:
         return f"the log lacks {', '.join(missing)}"
-    surfaces = [c.channel for c in motion.controls]
+    surfaces = motion.surfaces
     if not any(_moves(log, run, surfaces, motion) for run in range(len(log))):
         return f"{' and '.join(surfaces)} do not move in any run, or the aircraft does not answer"
     return ""
@@ -145,20 +146,10 @@ def _check(motion: Motion, logs: Sequence[FlightLog], aircraft: Aircraft | None)
 
 def _untold(logs: Sequence[FlightLog], reason: str) -> CheckResult:
     """The result of records without roll and yaw: nothing is compared."""
-    return CheckResult(
-        verdict="cannot_tell",
-        run_ids=tuple(run_id for log in logs for run_id in log.run_ids),
-        findings=(),
-        causes=(),
-        statistic=0.0,
-        degrees=0,
-        p_value=1.0,
-        enlargement=1.0,
-        residual_rms={},
-        sentences=(
-            f"These records cannot tell whether the channels of roll, yaw and sideslip agree: {reason}. Fly an aileron and a "
-            "rudder doublet.",
-        ),
+    return untestable(
+        (run_id for log in logs for run_id in log.run_ids),
+        f"These records cannot tell whether the channels of roll, yaw and sideslip agree: {reason}. Fly an aileron and a "
+        "rudder doublet.",
     )
 
 

@@ -23,9 +23,14 @@ _BANK_HZ: Final = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 apart."""
 
 
+def smoothing(dt_s: float) -> Array:
+    """Sections of the low-pass at `CUTOFF_HZ` of a measured surface."""
+    return butterworth(min(CUTOFF_HZ, 0.2 / dt_s), 4, dt_s)
+
+
 def smoothed_surface(surface_rad: Array, dt_s: float) -> Array:
     """(samples,) a measured surface without the noise above `CUTOFF_HZ`, less its first value."""
-    smooth = zero_phase(surface_rad[None], butterworth(min(CUTOFF_HZ, 0.2 / dt_s), 4, dt_s))
+    smooth = zero_phase(surface_rad[None], smoothing(dt_s))
     return np.asarray((smooth - smooth[:, :1])[0])
 
 
@@ -58,4 +63,4 @@ def pitch_motions(elevator_rad: Array, q_rad_s: Array, dt_s: float) -> Array:
     return np.array(rows)
 
 
-__all__ = ["pitch_motions", "smoothed_surface"]
+__all__ = ["pitch_motions", "smoothed_surface", "smoothing"]

@@ -9,13 +9,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.checks.rotation import across_flow
 from airtruth.checks.spectra import integral
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.srivc import filter_states
 from airtruth.physics.atmosphere import altitude_of_density_m
 from airtruth.physics.gust_figures import gust_scales
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.reconstruction import is_reconstructed
-from airtruth.units import DEG, FT, G0
+from airtruth.units import DEG, FT
 
 Array = NDArray[np.float64]
 
@@ -67,9 +69,10 @@ def measured(batch: Batch) -> list[RunMeasures]:
     batch : runs with elevator_rad, q_rad_s, alpha_rad, az_m_s2 and airspeed_m_s.
     """
     c = {name: values[:MOST_RUNS] for name, values in batch.channels.items()}
-    elevator, q = c["elevator_rad"] - c["elevator_rad"][:, :1], c["q_rad_s"] - c["q_rad_s"][:, :1]
+    (control,) = LONGITUDINAL.controls
+    surface, q = (x - x[:, :1] for x in (c[control.channel], c[control.damped]))
     total = _without_line(q)
-    rest = _unexplained(elevator, total, batch.dt_s)
+    rest = _unexplained(surface, total, batch.dt_s)
     left = (rest**2).mean(axis=1) / np.maximum((total**2).mean(axis=1), 1e-300)
     samples = max(2.0 * _BAND_HZ * batch.dt_s * q.shape[1], _FITTED + 1.0)
     share = np.maximum(1.0 - left * samples / (samples - _FITTED), 0.0)
@@ -78,14 +81,14 @@ def measured(batch: Batch) -> list[RunMeasures]:
     severe = np.array([severe_m_s(float(one)) for one in np.nan_to_num(altitude).mean(axis=1)])
     rms = np.sqrt((rest**2).mean(axis=1))
     # a pitch rate that does not move has no share
-    moving = np.ptp(c["q_rad_s"], axis=1) > 0.0
+    moving = np.ptp(c[control.damped], axis=1) > 0.0
     share = np.where(moving, share, 1.0)
     rows = zip(batch.run_ids, share.tolist(), rms.tolist(), gusts.tolist(), severe.tolist(), strict=False)
     return [RunMeasures(*row) for row in rows]
 
 
-def _unexplained(elevator: Array, q: Array, dt_s: float) -> Array:
-    """q less the response of the transfer function (b1 p + b2)/(p^2 + 2 z w p + w^2) of the elevator that explains most of it.
+def _unexplained(surface: Array, q: Array, dt_s: float) -> Array:
+    """q less the response of the transfer function (b1 p + b2)/(p^2 + 2 z w p + w^2) of the surface that explains most of it.
 
     For each w and z of a grid b1 and b2 follow by least squares; a search for the poles may end without a stable model.
     """
@@ -93,7 +96,7 @@ def _unexplained(elevator: Array, q: Array, dt_s: float) -> Array:
     for natural in _NATURAL_RAD_S:
         for damping in _DAMPING:
             poles = np.tile([2.0 * damping * natural, natural**2], (len(q), 1))
-            states = filter_states(poles, elevator, dt_s, "foh")
+            states = filter_states(poles, surface, dt_s, "foh")
             basis = np.linalg.qr(np.stack([_without_line(states[:, k]) for k in range(2)], axis=2))[0]
             rest = q - np.einsum("rnk,rk->rn", basis, np.einsum("rnk,rn->rk", basis, q))
             better = (rest**2).sum(axis=1) < (best**2).sum(axis=1)
@@ -103,13 +106,14 @@ def _unexplained(elevator: Array, q: Array, dt_s: float) -> Array:
 
 def _gusts_m_s(c: dict[str, Array], dt_s: float) -> Array:
     """rms of V (alpha - integral of q + (az cos alpha - ax sin alpha + g cos(theta - alpha))/V), a parabola taken out [m/s]."""
-    alpha, speed = c["alpha_rad"], np.maximum(np.abs(c["airspeed_m_s"]), 1.0)
-    turned = integral(c["q_rad_s"], dt_s)
+    alpha, q, az = (c[name] for name in LONGITUDINAL.output_channels)
+    speed = np.maximum(np.abs(c["airspeed_m_s"]), 1.0)
+    turned = integral(q, dt_s)
     theta = c.get(
         "theta_rad", turned - turned.mean(axis=1, keepdims=True) + alpha.mean(axis=1, keepdims=True)
     )
     ax = c.get("ax_m_s2", np.zeros_like(alpha))
-    force = c["az_m_s2"] * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha)
+    force = across_flow(az, ax, alpha, theta)
     basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, alpha.shape[1]), _LINES))[0]
     left = alpha - turned - integral(force / speed, dt_s)
     left = left - (left @ basis) @ basis.T

@@ -15,12 +15,16 @@ All angles are in rad, rates in rad/s, specific forces in m/s2; arrays broadcast
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.checks.spectra import integral
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
+Channels = Mapping[str, Array]
 
 
 def bank_coupling(q: Array, r: Array, phi: Array, theta: Array) -> Array:
@@ -53,11 +57,54 @@ def side_gravity(theta: Array, phi: Array) -> Array:
     return np.asarray(G0 * np.cos(theta) * np.sin(phi))
 
 
+def across_flow(az: Array, ax: Array | float, alpha: Array, theta: Array) -> Array:
+    """Specific force and gravity across the path, az cos a - ax sin a + g cos(theta - a) [m/s2]."""
+    return np.asarray(az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha))
+
+
+def given(c: Channels, name: str) -> Array:
+    """A channel of a log with roll and yaw, or zero where the log has none."""
+    return c[name] if name in c else np.zeros_like(c["p_rad_s"])
+
+
+def rates(c: Channels) -> tuple[Array, Array, Array, Array, Array]:
+    """p, q, r, phi, theta of a log with roll and yaw; zero where the log has none."""
+    p, q, r, phi, theta = (given(c, n) for n in ("p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad"))
+    return p, q, r, phi, theta
+
+
+def pitched(c: Channels, dt_s: float) -> Array:
+    """Change of pitch attitude by the rates [rad]; wings level where no bank is known."""
+    q = c["q_rad_s"]
+    turned = integral(q, dt_s)
+    if "phi_rad" not in c or "r_rad_s" not in c:
+        return turned
+    return turned + integral(pitch_coupling(q, c["r_rad_s"], c["phi_rad"]), dt_s)
+
+
+def banked(c: Channels, dt_s: float) -> Array:
+    """Change of bank by the rates [rad]."""
+    p, q, r, phi, theta = rates(c)
+    return integral(p + bank_coupling(q, r, phi, theta), dt_s)
+
+
+def headed(c: Channels, dt_s: float) -> Array:
+    """Change of heading by the rates [rad]."""
+    _, q, r, phi, theta = rates(c)
+    return integral(heading_rate(q, r, phi, theta), dt_s)
+
+
 __all__ = [
+    "across_flow",
     "alpha_coupling",
     "bank_coupling",
+    "banked",
+    "given",
+    "headed",
     "heading_rate",
     "pitch_coupling",
+    "pitched",
+    "rates",
     "side_gravity",
     "sideslip_turn",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite, informed_everywhere
-from airtruth.checks.spectra import Factors, integral, regress
+from airtruth.checks.spectra import Factors, regress
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
 
-CAUSES: Final = ("alpha_rad", "elevator_rad", "q_rad_s")
+VANE, GYRO, NORMAL = LONGITUDINAL.output_channels
+SURFACE = LONGITUDINAL.surfaces[0]
+CAUSES: Final = (VANE, SURFACE, GYRO)
 """Channels of the motion in pitch."""
 AXIAL_SLOPE: Final = (1.0, 0.4)
 """Slope of ax on alpha and its tolerance, as shares of gravity [-].
@@ -53,10 +56,10 @@ def slopes_near_trim(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
     """
 
     def keeps(c: Channels, dt_s: float) -> Array:
-        speed, alpha = c["airspeed_m_s"], c["alpha_rad"]
+        speed, alpha = c["airspeed_m_s"], c[VANE]
         most_speed, most_alpha = NEAR_TRIM
         slow = np.ptp(speed, axis=1) < most_speed * np.abs(speed.mean(axis=1))
-        pitch, yaw = (np.ptp(c.get(name, c[CAUSES[-1]]), axis=1) for name in (CAUSES[-1], "r_rad_s"))
+        pitch, yaw = (np.ptp(c.get(name, c[GYRO]), axis=1) for name in (GYRO, LATERAL.gyros[-1]))
         return np.asarray(slow & (np.ptp(alpha, axis=1) < most_alpha) & (yaw <= pitch))
 
     near = runs.each(keeps).astype(np.bool_)
@@ -64,18 +67,9 @@ def slopes_near_trim(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
     chosen = runs.some(rows)
     result = [] if aircraft is None else _aerodynamic_tests(chosen, aircraft)
     if "ax_m_s2" in runs.channels:
-        regressors = [chosen.spectra(_channel(n)) for n in CAUSES]
-        axial = chosen.spectra(_channel("ax_m_s2"))
-        result.append(_axial_test(regress(axial, np.stack(regressors, axis=1), lines=chosen.lines())))
+        axial = chosen.spectra_of("ax_m_s2")[:, 0]
+        result.append(_axial_test(regress(axial, chosen.spectra_of(*CAUSES), lines=chosen.lines())))
     return [_spread(test, rows, near) for test in result]
-
-
-def _channel(name: str) -> Callable[[Channels, float], Array]:
-    return lambda c, dt_s: c[name]
-
-
-def _integral(name: str) -> Callable[[Channels, float], Array]:
-    return lambda c, dt_s: integral(c[name], dt_s)
 
 
 def _spread(test: Relation, rows: NDArray[np.intp], near: NDArray[np.bool_]) -> Relation:
@@ -114,13 +108,11 @@ def _aerodynamic_tests(runs: Runs, aircraft: Aircraft) -> list[Relation]:
 
     pressure, lines = runs.each(dynamic), runs.lines()
     pressure = np.append(pressure, pressure.mean())
-    causes = [runs.spectra(_channel(n)) for n in CAUSES]
-    lift = regress(runs.spectra(_channel("az_m_s2")), np.stack(causes, axis=1), lines=lines)
-    causes = [runs.spectra(_integral(n)) for n in ("elevator_rad", "alpha_rad", "q_rad_s")]
-    control = regress(runs.spectra(_channel("q_rad_s")), np.stack(causes, axis=1), lines=lines)
-    area, chord = aircraft.wing_area_m2, aircraft.chord_m
+    area = aircraft.wing_area_m2
+    lift = regress(runs.spectra_of(NORMAL)[:, 0], runs.spectra_of(*CAUSES), lines=lines)
     to_lift = -aircraft.mass_kg / (pressure * area)
-    to_moment = aircraft.inertia_yy_kg_m2 / (pressure * area * chord)
+    control = regress(runs.spectra_of(GYRO)[:, 0], runs.integrals_of(SURFACE, VANE, GYRO), lines=lines)
+    to_moment = aircraft.inertia_yy_kg_m2 / (pressure * area * aircraft.chord_m)
     declared = aircraft.file.derivatives
     result = []
     for name, factors, scale, tolerance, channels in (
@@ -129,14 +121,14 @@ def _aerodynamic_tests(runs: Runs, aircraft: Aircraft) -> list[Relation]:
             lift,
             to_lift,
             LIFT_STD,
-            ("airspeed_m_s", "density_kg_m3", "alpha_rad", "az_m_s2", "elevator_rad", "q_rad_s"),
+            ("airspeed_m_s", "density_kg_m3", VANE, NORMAL, SURFACE, GYRO),
         ),
         (
             "Cmde",
             control,
             to_moment,
             MOMENT_STD,
-            ("elevator_rad", "airspeed_m_s", "density_kg_m3", "alpha_rad", "q_rad_s"),
+            (SURFACE, "airspeed_m_s", "density_kg_m3", VANE, GYRO),
         ),
     ):
         known = name in declared

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from airtruth.checks.fault import Fault
 from airtruth.checks.sentences import runs
 from airtruth.logs.flight_log import RESAMPLED, FlightLog
+from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ SLOWEST_HZ: Final = 0.5
 """Sample rate below which no record shows the short period of an aircraft [Hz] (judgement: periods are 0.3 to 10 s)."""
 FASTEST_HZ: Final = 5000.0
 """Sample rate above which no flight is recorded [Hz] (judgement: accelerometers reach 2 kHz)."""
-DYNAMIC: Final = ("alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")
+DYNAMIC: Final = LONGITUDINAL.channels
 """Channels that show the short period."""
 _LIKELY: Final = (
     ("milliseconds", 1e3),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.checks.spectra import spectrum
+from airtruth.checks.spectra import integral, spectrum
 from airtruth.logs.flight_log import Batch
 
 Array = NDArray[np.float64]
@@ -52,6 +52,15 @@ class Runs:
     def spectra(self, signal: Callable[[Channels, float], Array]) -> Array:
         """Spectra (runs, ..., lines) of a signal (runs, ..., samples); a short run has zeros behind its last line."""
         return _padded([spectrum(signal(part.channels, part.dt_s), part.dt_s) for part in self.parts])
+
+    def spectra_of(self, *names: str) -> Array:
+        """Spectra (runs, names, lines) of channels."""
+        return np.stack([self.spectra(lambda c, dt_s, n=name: c[n]) for name in names], axis=1)  # type: ignore[misc]
+
+    def integrals_of(self, *names: str) -> Array:
+        """Spectra (runs, names, lines) of the integrals of channels."""
+        of = [self.spectra(lambda c, dt_s, n=name: integral(c[n], dt_s)) for name in names]  # type: ignore[misc]
+        return np.stack(of, axis=1)
 
     def padded(self, lines: Callable[[Channels, float], Array]) -> Array:
         """Stack spectra (runs, ..., lines) that are computed already, padded as those of `spectra`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
@@ -77,6 +78,7 @@ def _measure(text: str) -> Any:
 
 @new_app.command("aircraft", epilog="Example: airtruth new aircraft --jsbsim c182 --out aircraft/mine")
 def aircraft(
+    context: typer.Context,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder of the aircraft; its name is the aircraft's.")
     ],
@@ -124,19 +126,7 @@ def aircraft(
     from airtruth.logs.names import name_of
     from airtruth.starting import Measured, aircraft_text, proposed_aircraft
 
-    known = Measured(
-        span_m=span_m,
-        wing_area_m2=wing_area_m2,
-        tail_area_m2=tail_area_m2,
-        tail_arm_m=tail_arm_m,
-        mass_kg=mass_kg,
-        inertia_kg_m2=inertia_kg_m2,
-        length_m=length_m,
-        chord_m=chord_m,
-        tail_span_m=tail_span_m,
-        elevator_share=elevator_share,
-        cg=cg,
-    )
+    known = Measured(**{f.name: context.params[f.name] for f in fields(Measured)})
     folder = out.parent if out.name == "aircraft.toml" else out
     file = folder / "aircraft.toml"
     steps = [

@@ -15,6 +15,7 @@ from airtruth.design.limits import Extremes, Limits, extremes
 from airtruth.design.waveforms import START_S, multistep
 from airtruth.errors import ConfigurationError, FlightError
 from airtruth.logs.flight_log import FlightLog
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign import effects as with_effects
 from airtruth.simulation.campaign.file import Campaign
@@ -60,6 +61,17 @@ class Flown:
     channels: Mapping[str, Array]
     reached: Extremes
     record: TraceRecord
+
+    @property
+    def t_s(self) -> Array:
+        """(samples,) times [s]."""
+        return self.record.signals.dt_s * np.arange(len(self.moved_rad), dtype=np.float64)
+
+    @property
+    def moved_rad(self) -> Array:
+        """(samples,) surface about its trim [rad]."""
+        surface = self.channels[LONGITUDINAL.surfaces[0]]
+        return np.asarray(surface - surface[0])
 
 
 class Bench:
@@ -118,7 +130,7 @@ class Bench:
             length = min(unit, limits.length_s / 7.0)
             found = self._within(multistep((3.0, 2.0, 1.0, 1.0), length, 0.0, self.dt_s))
             if found is not None:
-                rate = max(rate, float(np.abs(found[1]["q_rad_s"]).max()))
+                rate = max(rate, float(np.abs(found[1][LONGITUDINAL.gyros[0]]).max()))
         if rate == 0.0:
             raise FlightError(
                 f"plan: {self.aircraft.name} leaves the range of the simulation at {self.condition.eas_m_s:g} m/s EAS "
@@ -178,7 +190,7 @@ class Bench:
         return manoeuvre, flown[0], reduce(Extremes.and_of, reached)
 
     def _record(self, channels: Mapping[str, Array]) -> TraceRecord:
-        samples = len(channels["alpha_rad"])
+        samples = len(channels[LONGITUDINAL.vane])
         log = FlightLog(
             metadata={"aircraft": self.aircraft.name},
             run_ids=("plan",),

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,7 +17,7 @@ from airtruth.arguments import require_whole
 from airtruth.design.bench import Bench
 from airtruth.design.limits import Limits
 from airtruth.design.separation import FilterSetting
-from airtruth.errors import AirtruthError, ConfigurationError
+from airtruth.errors import ConfigurationError
 from airtruth.physics.gust_figures import GustScales, gust_scales
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.simulation.campaign.file import NO_GUST, Campaign, ConditionTable
@@ -27,8 +27,6 @@ from airtruth.simulation.manoeuvres import Manoeuvre
 from airtruth.simulation.simulator import Condition, jsbsim_model
 from airtruth.tracing.conditions import gust_length_m
 from airtruth.tracing.model.settings import declared_change, settings_of
-
-T = TypeVar("T")
 
 LEAST_RECORDS: Final = 6
 """Least records of a planned campaign of which the number is not stated [-] (judgement: four to fit, two to hold out)."""
@@ -112,41 +110,6 @@ def _require_open_loop(campaign: Campaign) -> None:
             "which a planned input does not take into account; set its "
             "gains to 0"
         )
-
-
-def best_condition(
-    campaign: Campaign, made: Callable[[Condition], T], value: Callable[[T], float], told: Callable[[T], None]
-) -> T:
-    """The object that is made at the flight condition of the largest value.
-
-    Parameters
-    ----------
-    campaign : of its airspeed the ends and the middle of a range are tried, or each value of a choice.
-    made : makes something at a condition; a condition at which it fails is left out.
-    value : what is compared.
-    told : receives each where several are compared.
-
-    Raises
-    ------
-    AirtruthError
-        Of the last condition, where all fail.
-    """
-    every = list(conditions(campaign))
-    tried: list[T] = []
-    problem: AirtruthError | None = None
-    for at in every:
-        try:
-            one = made(at)
-        except AirtruthError as error:
-            problem = error
-            continue
-        tried.append(one)
-        if len(every) > 1:
-            told(one)
-    if not tried:
-        assert problem is not None
-        raise problem
-    return max(tried, key=value)
 
 
 def conditions(campaign: Campaign) -> Iterator[Condition]:
@@ -259,7 +222,6 @@ def in_words(m: Manoeuvre) -> str:
 __all__ = [
     "LEAST_RECORDS",
     "PlanOptions",
-    "best_condition",
     "conditions",
     "fitted_of",
     "flying",

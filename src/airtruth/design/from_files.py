@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -19,6 +19,7 @@ from airtruth.design.narrow_result import NarrowResult
 from airtruth.design.narrowing import narrow
 from airtruth.design.precision import DerivativeQuestion
 from airtruth.design.question import from_names, motion_of, tied_in
+from airtruth.design.search import Step
 from airtruth.design.split_result import SplitResult
 from airtruth.design.splitting import split
 from airtruth.design.verdict import Asked, asked_by, least_known
@@ -36,8 +37,6 @@ from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.simulator import jsbsim_model
 from airtruth.tracing.answer import TraceAnswer, answer_path
 from airtruth.tracing.update import WITHOUT_EFFECTS
-
-Step = Callable[[str], None]
 
 _NAME: Final = "next"
 """Name of a planned campaign that is not written to a file."""

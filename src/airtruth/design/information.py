@@ -16,6 +16,7 @@ from airtruth.identification.likelihood.fit import fit
 from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.gust_figures import GustScales
+from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
 
@@ -65,18 +66,23 @@ class LinearExperiment:
         return np.asarray(fit(batch, self.aircraft, theta[None], options).theta[0] - theta)
 
     def _read(self, flown: Mapping[str, Array]) -> tuple[Batch, FilterOptions]:
-        channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
-        samples = channels["alpha_rad"].shape[1]
-        t_s = self.dt_s * np.arange(samples, dtype=np.float64)[None]
+        alpha, q, az = (self.noise[name] for name in LONGITUDINAL.output_channels)
         options = FilterOptions(
-            self.noise["alpha_rad"],
-            self.noise["q_rad_s"],
-            self.noise["az_m_s2"],
+            alpha,
+            q,
+            az,
             **self.gusts._asdict(),
             airspeed_std_m_s=self.noise.get("airspeed_m_s"),
             airspeed_m_s=self.airspeed_m_s,
         )
-        return Batch(("plan",), self.dt_s, t_s, channels), options
+        return batch_of(flown, self.dt_s), options
+
+
+def batch_of(flown: Mapping[str, Array], dt_s: float) -> Batch:
+    """A flight, channel -> (samples,), as a batch of one run."""
+    channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
+    samples = next(iter(channels.values())).shape[1]
+    return Batch(("plan",), dt_s, dt_s * np.arange(samples, dtype=np.float64)[None], channels)
 
 
 def sensor_noise(

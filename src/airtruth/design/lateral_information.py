@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.design.information import batch_of
 from airtruth.identification.lateral.methods import lateral_values
 from airtruth.identification.lateral.predictor import GUST, PROCESS, levels, outputs_of, records_of
 from airtruth.identification.likelihood.cramer_rao import bound
 from airtruth.identification.likelihood.predictor import W_START
 from airtruth.identification.options import Options
-from airtruth.logs.flight_log import Batch
 from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
@@ -57,9 +57,7 @@ class LateralExperiment:
             other axis, which is known.
         theta : (15,) true derivatives [-].
         """
-        channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
-        t_s = self.dt_s * np.arange(channels["p_rad_s"].shape[1], dtype=np.float64)[None]
-        batch = Batch(("plan",), self.dt_s, t_s, channels)
+        batch = batch_of(flown, self.dt_s)
         options = Options(pressure="constant", condition="record")
         data = records_of(batch, lateral_values(self.aircraft), options, self.length_v_m, gusts=True)
         outputs = {output.name: output.channel for output in LATERAL.outputs}

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
@@ -136,16 +137,9 @@ class Extremes:
 
     def and_of(self, other: Extremes) -> Extremes:
         """The larger of two flights in each respect."""
-        return Extremes(
-            elevator_rad=max(self.elevator_rad, other.elevator_rad),
-            rate_rad_s=max(self.rate_rad_s, other.rate_rad_s),
-            alpha_rad=max(self.alpha_rad, other.alpha_rad),
-            load_factor=(
-                min(self.load_factor[0], other.load_factor[0]),
-                max(self.load_factor[1], other.load_factor[1]),
-            ),
-            airspeed=max(self.airspeed, other.airspeed),
-        )
+        lows, highs = zip(self.load_factor, other.load_factor, strict=True)
+        largest = {f.name: max(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)}
+        return Extremes(**largest | {"load_factor": (min(lows), max(highs))})
 
 
 def extremes(channels: Mapping[str, Array], dt_s: float) -> Extremes:
@@ -164,11 +158,11 @@ def extremes(channels: Mapping[str, Array], dt_s: float) -> Extremes:
     >>> extremes(flown, 0.02).rate_rad_s
     0.5
     """
-    elevator, alpha = channels["elevator_rad"], channels["alpha_rad"]
-    factor, speed = -channels["az_m_s2"] / G0, channels["airspeed_m_s"]
+    surface, alpha = channels[LONGITUDINAL.surfaces[0]], channels[LONGITUDINAL.vane]
+    factor, speed = -channels[LONGITUDINAL.outputs[-1].channel] / G0, channels["airspeed_m_s"]
     return Extremes(
-        elevator_rad=float(np.abs(elevator - elevator[0]).max()),
-        rate_rad_s=float(np.abs(np.diff(elevator)).max() / dt_s),
+        elevator_rad=float(np.abs(surface - surface[0]).max()),
+        rate_rad_s=float(np.abs(np.diff(surface)).max() / dt_s),
         alpha_rad=float(np.abs(alpha - alpha[0]).max()),
         load_factor=(float(factor.min()), float(factor.max())),
         airspeed=float(np.abs(speed / speed[0] - 1.0).max()),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -12,16 +11,16 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.neutral import effective
 from airtruth.design.bench import Bench, Flown
-from airtruth.design.flight import LEAST_RECORDS, PlanOptions, best_condition, flying, in_words, planning
+from airtruth.design.flight import LEAST_RECORDS, PlanOptions, flying, in_words, planning
 from airtruth.design.narrow_result import BandHistories, ForecastQuantity, NarrowResult, NarrowRow
-from airtruth.design.search import REFERENCE, InputSearch, Rated, Setup, run
+from airtruth.design.search import REFERENCE, InputSearch, Rated, Setup, Step, best_setup, run
 from airtruth.errors import ConfigurationError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.simulator import Condition
 
 Array = NDArray[np.float64]
-Step = Callable[[str], None]
 
 
 class Targets(Protocol):
@@ -122,14 +121,13 @@ def narrow(
 
 
 def _narrow(asked: _Asked, step: Step) -> NarrowResult:
-    def told(made: Setup[Targets]) -> None:
-        at = made.search.bench.condition
-        step(
-            f"{at.eas_m_s:.4g} m/s EAS: the {REFERENCE} divides standard errors by {made.reference.value:.3g}"
-        )
-
     step("trim and probe the declared aircraft")
-    chosen = best_condition(asked.campaign, asked.at, lambda made: made.reference.value, told)
+    chosen = best_setup(
+        asked.campaign,
+        asked.at,
+        lambda value: f"the {REFERENCE} divides standard errors by {value:.3g}",
+        step,
+    )
     best = run(chosen.search, asked.options.seed, step)
     step("rate the best inputs with all draws")
     finals, reference = chosen.finals(best.values())
@@ -169,14 +167,8 @@ def _row(rated: Rated, targets: Targets) -> NarrowRow:
 
 
 def _histories(flown: Flown, reference: Flown) -> BandHistories:
-    elevator, compared = (f.channels["elevator_rad"] for f in (flown, reference))
-    alpha = flown.channels["alpha_rad"]
-    return BandHistories(
-        t_s=flown.record.signals.dt_s * np.arange(len(elevator), dtype=np.float64),
-        elevator_rad=elevator - elevator[0],
-        reference_rad=compared - compared[0],
-        alpha_rad=alpha,
-    )
+    alpha = flown.channels[LONGITUDINAL.vane]
+    return BandHistories(flown.t_s, flown.moved_rad, reference.moved_rad, alpha)
 
 
 __all__ = ["Question", "Targets", "narrow"]

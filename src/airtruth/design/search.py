@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 
 from airtruth.design import waveforms
 from airtruth.design.bench import Bench, Flown
-from airtruth.errors import ConfigurationError
+from airtruth.design.flight import conditions
+from airtruth.errors import AirtruthError, ConfigurationError
+from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.manoeuvres import Manoeuvre
+from airtruth.simulation.simulator import Condition
 
 Array = NDArray[np.float64]
 Step = Callable[[str], None]
@@ -163,6 +166,40 @@ class Setup(Generic[C]):
         return sorted(finals, key=lambda r: -r.value), reference
 
 
+def best_setup(
+    campaign: Campaign, made: Callable[[Condition], Setup[C]], words: Callable[[float], str], step: Step
+) -> Setup[C]:
+    """The search at the flight condition where the reference input has the largest value.
+
+    Parameters
+    ----------
+    campaign : of its airspeed the ends and the middle of a range are tried, or each value of a choice.
+    made : makes the search at a condition; a condition at which it fails is left out.
+    words : value of a reference input -> what ``step`` receives of it where several conditions are compared.
+
+    Raises
+    ------
+    AirtruthError
+        Of the last condition, where all fail.
+    """
+    every = list(conditions(campaign))
+    tried: list[Setup[C]] = []
+    problem: AirtruthError | None = None
+    for at in every:
+        try:
+            one = made(at)
+        except AirtruthError as error:
+            problem = error
+            continue
+        tried.append(one)
+        if len(every) > 1:
+            step(f"{at.eas_m_s:.4g} m/s EAS: {words(one.reference.value)}")
+    if not tried:
+        assert problem is not None
+        raise problem
+    return max(tried, key=lambda one: one.reference.value)
+
+
 def run(search: InputSearch[C], seed: int, step: Step = lambda text: None) -> dict[str, Rated]:
     """Search every family; the best input of each.
 
@@ -229,4 +266,15 @@ def _multisines(search: InputSearch[C], seed: int) -> None:
             parent, weights = child, tried
 
 
-__all__ = ["MULTISINE", "MULTISTEP", "REFERENCE", "InputSearch", "Merit", "Rated", "Setup", "run"]
+__all__ = [
+    "MULTISINE",
+    "MULTISTEP",
+    "REFERENCE",
+    "InputSearch",
+    "Merit",
+    "Rated",
+    "Setup",
+    "Step",
+    "best_setup",
+    "run",
+]

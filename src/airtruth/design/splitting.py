@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,6 @@ from airtruth.design.criterion import Criterion, criterion
 from airtruth.design.flight import (
     LEAST_RECORDS,
     PlanOptions,
-    best_condition,
     conditions,
     fitted_of,
     flying,
@@ -25,7 +24,7 @@ from airtruth.design.flight import (
     planning,
 )
 from airtruth.design.question import Hypothesised, at_point
-from airtruth.design.search import REFERENCE, InputSearch, Rated, Setup, run
+from airtruth.design.search import REFERENCE, InputSearch, Rated, Setup, Step, best_setup, run
 from airtruth.design.separation import FilterSetting
 from airtruth.design.split_result import InputRow, Prediction, SplitResult, split_probability
 from airtruth.errors import ConfigurationError
@@ -34,7 +33,6 @@ from airtruth.simulation.resolution import point_of
 from airtruth.simulation.simulator import Condition
 
 Array = NDArray[np.float64]
-Step = Callable[[str], None]
 
 MOST_RECORDS: Final = 60
 """Most records of a planned campaign of which the number is not stated [-] (judgement: an hour at one record a minute)."""
@@ -97,7 +95,12 @@ def _split(
     step: Step,
 ) -> SplitResult:
     step("trim and probe the declared aircraft")
-    chosen = _best_condition(campaign, hypotheses, options, aircraft, step)
+    chosen = best_setup(
+        campaign,
+        lambda at: _at(campaign, at, hypotheses, options, aircraft),
+        lambda value: f"{value:.3g} standard deviations by the {REFERENCE}",
+        step,
+    )
     best = run(chosen.search, options.seed, step)
     step("rate the best inputs with all draws")
     finals, reference = chosen.finals(best.values())
@@ -135,27 +138,6 @@ def enough_records(sigma: float) -> int:
         if split_probability(sigma * math.sqrt(fitted_of(records) / first)) >= ENOUGH:
             return records
     return MOST_RECORDS
-
-
-def _best_condition(
-    campaign: Campaign,
-    hypotheses: Sequence[Hypothesised],
-    options: PlanOptions,
-    aircraft: Aircraft,
-    step: Step,
-) -> Setup[Criterion]:
-    """The condition at which the reference input separates most."""
-
-    def told(made: Setup[Criterion]) -> None:
-        at = made.search.bench.condition
-        step(f"{at.eas_m_s:.4g} m/s EAS: {made.reference.value:.3g} standard deviations by the {REFERENCE}")
-
-    return best_condition(
-        campaign,
-        lambda at: _at(campaign, at, hypotheses, options, aircraft),
-        lambda made: made.reference.value,
-        told,
-    )
 
 
 def _at(
@@ -207,14 +189,8 @@ def _row(rated: Rated) -> InputRow:
 
 def _prediction(judged: Criterion, flown: Flown, reference: Flown) -> Prediction:
     first, second = judged.differences(flown.record)
-    dt = flown.record.signals.dt_s
-    return Prediction(
-        t_s=dt * np.arange(len(first), dtype=np.float64),
-        elevator_rad=flown.channels["elevator_rad"] - flown.channels["elevator_rad"][0],
-        reference_rad=reference.channels["elevator_rad"] - reference.channels["elevator_rad"][0],
-        difference=first - second,
-        noise=judged.model.settings.noise,
-    )
+    noise = judged.model.settings.noise
+    return Prediction(flown.t_s, flown.moved_rad, reference.moved_rad, first - second, noise)
 
 
 __all__ = ["enough_records", "reference_separation", "split"]

@@ -27,6 +27,7 @@ from airtruth.identification.signals import ALPHA, AZ, COMMAND, Q
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import Scale, scale
 from airtruth.units import G0
 
@@ -171,7 +172,7 @@ def across_path(batch: Batch) -> Array:
 
     One where theta is not measured, and in runs whose cosine changes by at most `_LEVEL`, in means over `_BLOCK_S`.
     """
-    alpha, theta = batch.channels["alpha_rad"], batch.channels.get("theta_rad")
+    alpha, theta = batch.channels[LONGITUDINAL.vane], batch.channels.get("theta_rad")
     if theta is None:
         return np.ones_like(alpha)
     cosine = np.cos(theta - alpha)
@@ -242,10 +243,8 @@ def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float,
 def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Observation:
     """Return the signals that the estimators read, az in g; nothing is checked."""
     channels = batch.channels
-    signals = np.stack(
-        [channels["alpha_rad"], channels["q_rad_s"], channels["az_m_s2"] / G0, channels["elevator_rad"]],
-        axis=1,
-    )
+    signals = np.stack([channels[name] for name in LONGITUDINAL.channels], axis=1)
+    signals[:, AZ] /= G0
     sos = butterworth(options.cutoff_of(batch.dt_s), options.order, batch.dt_s)
     smooth = zero_phase(signals, sos)
     condition = flight_condition(batch, constants, options, smooth[:, Q])

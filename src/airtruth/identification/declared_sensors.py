@@ -8,8 +8,9 @@ position, slope over alpha. Biases remain: a free constant of each equation take
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -49,10 +50,9 @@ _WORDS: Final = {
 }
 """Errors that are taken out, by the field of `SensorErrors`, in words."""
 _PLACED: Final = {
-    "alpha_rad": ("x_m",),
-    "az_m_s2": ("x_m", "z_m"),
-    "beta_rad": ("x_m", "z_m"),
-    "ay_m_s2": ("x_m", "z_m"),
+    y.channel: ("x_m", "z_m") if y.channel != LONGITUDINAL.vane else ("x_m",)
+    for y in (*LONGITUDINAL.outputs, *LATERAL.outputs)
+    if y.instrument in ("vane", "accelerometer")
 }
 """Channels that depend on the position of their instrument, and on which part of it."""
 _WHOLE: Final = 1e-6
@@ -98,7 +98,7 @@ def as_ideal(batch: Batch, taken: Taken) -> Batch:
     """
     errors = {name: SensorErrors(**own) for name, own in taken.items() if name in batch.channels}
     if is_reconstructed(batch.channels):
-        errors.pop("alpha_rad", None)
+        errors.pop(LONGITUDINAL.vane, None)
     if not errors:
         return batch
     samples = batch.t_s.shape[1]
@@ -119,11 +119,11 @@ def as_ideal(batch: Batch, taken: Taken) -> Batch:
     channels = {name: np.ascontiguousarray(values[:, :kept]) for name, values in channels.items()}
     for name, own in errors.items():
         if name in _PLACED:
-            channels[name] = channels[name] + _moved(name, own, channels, sos, batch.dt_s)
-    if "airspeed_m_s" in errors and "alpha_rad" in channels:
-        channels["airspeed_m_s"] = channels["airspeed_m_s"] / errors["airspeed_m_s"].slope(
-            channels["alpha_rad"]
-        )
+            rate = partial(_rate, sos=sos, dt_s=batch.dt_s)
+            channels[name] = channels[name] + moved_to_cg(name, own, channels, rate)
+    if "airspeed_m_s" in errors and LONGITUDINAL.vane in channels:
+        factor = errors["airspeed_m_s"].slope(channels[LONGITUDINAL.vane])
+        channels["airspeed_m_s"] = channels["airspeed_m_s"] / factor
     return replace(batch, t_s=batch.t_s[:, :kept], channels=channels)
 
 
@@ -160,21 +160,29 @@ def _rate(x: Array, sos: Array, dt_s: float) -> Array:
     return np.asarray(CubicSpline(at, zero_phase(x, sos), axis=1)(at, 1))
 
 
-def _moved(name: str, own: SensorErrors, channels: Mapping[str, Array], sos: Array, dt_s: float) -> Array:
-    """Value at the CG less the reading, by `airtruth.physics.sensors.vane_alpha` and `accelerometer_az`.
+def moved_to_cg(
+    name: str, own: SensorErrors, channels: Mapping[str, Array], rate: Callable[[Array], Array]
+) -> Array:
+    """Value at the CG less the reading, the inverse of `airtruth.physics.sensors.at_instrument`.
 
     Sideslip and side force: beta_vane = beta + x r/V - z p/V, ay = ay_cg + x r' - z p'; the products of rates with pitch
     rate and bank, a hundredth of these, are left out.
+
+    Parameters
+    ----------
+    name : column of a vane or an accelerometer; own : its position.
+    channels : column -> (runs, samples) of one length.
+    rate : derivative of a measured rate [rad/s2].
     """
-    if name in ("beta_rad", "ay_m_s2"):
-        p, r = channels["p_rad_s"], channels["r_rad_s"]
-        if name == "beta_rad":
-            return np.asarray((own.z_m * p - own.x_m * r) / channels["airspeed_m_s"])
-        return np.asarray(own.z_m * _rate(p, sos, dt_s) - own.x_m * _rate(r, sos, dt_s))
-    q = channels["q_rad_s"]
-    if name == "alpha_rad":
-        return np.asarray(q * own.x_m / channels["airspeed_m_s"])
-    return np.asarray(own.x_m * _rate(q, sos, dt_s) + own.z_m * np.square(q))
+    x, y, z, speed = own.x_m, own.y_m, own.z_m, channels["airspeed_m_s"]
+    if name in LATERAL.output_channels:
+        p, r = (channels[gyro] for gyro in LATERAL.gyros)
+        return np.asarray((z * p - x * r) / speed if name == LATERAL.vane else z * rate(p) - x * rate(r))
+    q = channels[LONGITUDINAL.gyros[0]]
+    if name == LONGITUDINAL.vane:
+        moved = q * x / speed
+        return np.asarray(moved - channels[LATERAL.gyros[0]] * y / speed if y else moved)
+    return np.asarray(x * rate(q) + z * np.square(q))
 
 
-__all__ = ["CHANNELS", "Taken", "as_ideal", "declared_words", "taken_out"]
+__all__ = ["CHANNELS", "Taken", "as_ideal", "declared_words", "moved_to_cg", "taken_out"]

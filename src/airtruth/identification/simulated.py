@@ -165,19 +165,20 @@ def _record(
     own = values_of(constants)
     s = scale(own.wing_area_m2, own.chord_m, own.mass_kg, own.inertia_yy_kg_m2, airspeed, density)
     measured = np.stack([channels[c] for c in OUTPUTS], axis=1)
+    (control,) = LONGITUDINAL.surfaces
     models = {}
     for method, row in rows.items():
         y = np.full_like(measured, np.nan)
         if row is not None:
             theta = np.array([float(row[name]) for name in LONGITUDINAL.parameters])
             if (np.abs(theta) < _LARGEST).all():
-                y = simulate(theta, s, dt, channels["elevator_rad"], measured)
+                y = simulate(theta, s, dt, channels[control], measured)
         models[method] = {c: y[:, i] for i, c in enumerate(OUTPUTS)}
     return History(
         run_id=run_id,
         group="",
         t_s=t_s,
-        controls_rad={"elevator_rad": channels["elevator_rad"]},
+        controls_rad={control: channels[control]},
         measured={c: channels[c] for c in OUTPUTS},
         models=models,
         conditions={

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from airtruth.importers.mapping import Resample
 from airtruth.importers.series import Series
+from airtruth.physics.motion import MOTIONS
 
 Array = NDArray[np.float64]
 
@@ -38,9 +39,9 @@ _COVERED: Final = 0.8
 _SMOOTH: Final = 0.5
 """Least correlation of successive samples of a surface [-] (judgement): a random sequence of steps has none, and its surface does
 keep each value."""
-_SET: Final = ("throttle", "elevator_command_rad", "aileron_command_rad", "rudder_command_rad")
+_SET: Final = ("throttle", *(name for motion in MOTIONS.values() for name in motion.commands))
 """Channels that a computer or a pilot sets, and that do keep their value until the next one."""
-_SURFACES: Final = ("elevator_rad", "aileron_rad", "rudder_rad")
+_SURFACES: Final = tuple(name for motion in MOTIONS.values() for name in motion.surfaces)
 """Channels whose steps may be those of an input."""
 
 

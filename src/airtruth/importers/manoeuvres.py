@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.checks.means import LIMITS, MEANS
+from airtruth.checks.pitch_motions import smoothing
 from airtruth.documents import read_plain
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.importers.free_response import free_spans
@@ -25,7 +26,8 @@ from airtruth.importers.manoeuvre_result import FREE, INPUT, CandidateManoeuvre,
 from airtruth.importers.mapping import ManoeuvreSpan, Resample
 from airtruth.importers.series import Series
 from airtruth.importers.uniform import gaps, resampled
-from airtruth.numerics.prefilter import butterworth, edge_samples
+from airtruth.numerics.prefilter import edge_samples
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
@@ -64,13 +66,13 @@ TURNING: Final = 1.15
 
 FLYING_M_S: Final = MEANS["airspeed_m_s"][0]
 """Mean airspeed below which an aircraft is on the ground [m/s]: no log of a flight has less."""
-DEFLECTED_RAD: Final = LIMITS["elevator_rad"][1]
+_SURFACE, _RATE = LONGITUDINAL.controls[0].channel, LONGITUDINAL.controls[0].damped
+_NORMAL = LONGITUDINAL.outputs[-1].channel
+DEFLECTED_RAD: Final = LIMITS[_SURFACE][1]
 """Deflection beyond which a column holds no elevator [rad]: no log of a flight has more."""
-FILTER: Final = (5.0, 0.2, 4)
-"""Cutoff of the low-pass of `airtruth check` [Hz], its largest share of the sample rate [-], and its order: the longest filter
-of all commands."""
 LENGTHS: Final = 4
-"""Least length of a record over the extension of that filter [-], as `check` and `identify` demand it."""
+"""Least length of a record over the extension of the low-pass of `airtruth check`, the longest of all commands [-], as `check`
+and `identify` demand it."""
 
 
 def find(where: str, series: Mapping[str, Series], rate_hz: float | None = None) -> ManoeuvreResult:
@@ -90,11 +92,11 @@ def find(where: str, series: Mapping[str, Series], rate_hz: float | None = None)
     LogError
         If elevator or q is missing, or the record is shorter than a manoeuvre.
     """
-    needed = ("elevator_rad", "q_rad_s")
+    needed = (_SURFACE, _RATE)
     missing = [n for n in needed if n not in series or series[n].constant]
     if missing:
         raise LogError(f"{where}: the search for manoeuvres needs {', '.join(missing)}; map a column")
-    used = {n: _clean(series[n]) for n in (*needed, "airspeed_m_s", "az_m_s2") if n in series}
+    used = {n: _clean(series[n]) for n in (*needed, "airspeed_m_s", _NORMAL) if n in series}
     used = {n: one for n, one in used.items() if len(one.t_s) > 3}
     start, end = max(one.t_s[0] for one in used.values()), min(one.t_s[-1] for one in used.values())
     count = int((end - start) * RATE_HZ) + 1
@@ -103,23 +105,23 @@ def find(where: str, series: Mapping[str, Series], rate_hz: float | None = None)
     t = start + np.arange(count) / RATE_HZ
     how = Resample(rate_hz=RATE_HZ, method="linear")
     c = {name: resampled(one, t, how) for name, one in used.items()}
-    deviation, threshold = _deviation(c["elevator_rad"])
-    background = _background(c["q_rad_s"])
+    deviation, threshold = _deviation(c[_SURFACE])
+    background = _background(c[_RATE])
     spans = [(first, last, INPUT) for first, last in _spans(deviation, threshold)]
-    spans += _free(c["q_rad_s"], spans, background)
+    spans += _free(c[_RATE], spans, background)
     spans.sort()
-    least_s = shortest_s(rate_hz or 1.0 / float(np.median(np.diff(used["q_rad_s"].t_s))))
+    least_s = shortest_s(rate_hz or 1.0 / float(np.median(np.diff(used[_RATE].t_s))))
     candidates = []
     for number, (first, last, kind) in enumerate(spans):
         before = spans[number - 1][1] if number else 0
         after = spans[number + 1][0] if number + 1 < len(spans) else count - 1
         low = max(first - round(TRIM_S * RATE_HZ), before)
-        high = _settled(c["q_rad_s"], last, min(after, count - 1), background)
+        high = _settled(c[_RATE], last, min(after, count - 1), background)
         high = min(max(high, low + math.ceil(least_s * RATE_HZ) + 1), after, count - 1)
         at = (low, first, last, high)
         one = _candidate(f"m{number + 1:02d}", kind, c, deviation, at, background, t, least_s)
         candidates.append(_without_gaps(one, used))
-    return ManoeuvreResult(tuple(candidates), t, c["elevator_rad"], c["q_rad_s"], threshold)
+    return ManoeuvreResult(tuple(candidates), t, c[_SURFACE], c[_RATE], threshold)
 
 
 def shortest_s(rate_hz: float) -> float:
@@ -129,9 +131,7 @@ def shortest_s(rate_hz: float) -> float:
     ----------
     rate_hz : sample rate [Hz].
     """
-    cutoff_hz, share, order = FILTER
-    sos = butterworth(min(cutoff_hz, share * rate_hz), order, 1.0 / rate_hz)
-    return LENGTHS * edge_samples(sos) / rate_hz
+    return LENGTHS * edge_samples(smoothing(1.0 / rate_hz)) / rate_hz
 
 
 def _without_gaps(candidate: CandidateManoeuvre, used: Mapping[str, Series]) -> CandidateManoeuvre:
@@ -218,16 +218,16 @@ def _candidate(
     """Measures of one candidate: start, first and last sample of the input, and end."""
     low, first, last, high = at
     part = slice(low, high + 1)
-    elevator = c["elevator_rad"]
+    elevator = c[_SURFACE]
     size = float(np.ptp(elevator[first : last + 1])) or float(np.ptp(elevator[part]))
     quiet = elevator[low : max(first - round(0.2 * RATE_HZ), low + 1)]
     trim = float(np.ptp(quiet)) / size if size > 0.0 else np.inf
-    response = float(c["q_rad_s"][first : high + 1].std()) / max(background, 1e-9)
+    response = float(c[_RATE][first : high + 1].std()) / max(background, 1e-9)
     speed = c["airspeed_m_s"][part] if "airspeed_m_s" in c else np.array([np.nan])
     change = (
         float(np.ptp(speed)) / max(abs(float(speed.mean())), 1e-9) if np.isfinite(speed).all() else np.nan
     )
-    load = float(np.median(c["az_m_s2"][part])) / -G0 if "az_m_s2" in c else np.nan
+    load = float(np.median(c[_NORMAL][part])) / -G0 if _NORMAL in c else np.nan
     reasons = []
     if speed.mean() < FLYING_M_S:
         reasons.append(f"on the ground: airspeed of {speed.mean():.1f} m/s")

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from airtruth.channels import SIGNALS
+from airtruth.channels import ATTITUDE, SIGNALS
 from airtruth.documents import read_toml
 from airtruth.errors import ConfigurationError, choices
 from airtruth.importers.channel_table import (
@@ -244,7 +244,7 @@ class MappingFile(Strict):
             raise ValueError(
                 "[reconstruct] alpha replaces a missing vane; leave channels.alpha_rad out, or it"
             )
-        angles = [name for name in ("theta_rad", "phi_rad", "psi_rad") if name in given]
+        angles = [name for name in ATTITUDE if name in given]
         if self.attitude is not None and angles:
             raise ValueError(f"channels.{angles[0]} is computed from [attitude]; keep one of the two")
         if self.body_velocity is None:
@@ -261,7 +261,7 @@ class MappingFile(Strict):
 
     def _require_own_surfaces(self) -> None:
         """Refuse two surfaces of one combination of two columns: of elevons or a V-tail one of them holds the other motion."""
-        for names in itertools.combinations((c.channel for m in MOTIONS.values() for c in m.controls), 2):
+        for names in itertools.combinations((name for m in MOTIONS.values() for name in m.surfaces), 2):
             pair = [self.channels[name] for name in names if name in self.channels]
             if len(pair) < 2 or pair[0].calibration != pair[1].calibration or len(pair[0].places) != 2:
                 continue

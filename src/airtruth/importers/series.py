@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import ATTITUDE
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers.attitude import LEAST_NORM, air_angles, continuous, euler_angles
 from airtruth.importers.channel_table import Points
@@ -26,6 +27,7 @@ from airtruth.importers.mapping import (
 from airtruth.importers.mirrored import are_mirrored
 from airtruth.importers.sources import Source, numbers
 from airtruth.logs.validate import JITTER, single_precision_s
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import ZEROS
 
 Array = NDArray[np.float64]
@@ -36,9 +38,7 @@ _EDGE: Final = 0.1
 
 
 _TURNING: Final[dict[str, Callable[[Array], Array]]] = {
-    "theta_rad": continuous,
-    "phi_rad": np.unwrap,
-    "psi_rad": np.unwrap,
+    name: continuous if name == "theta_rad" else np.unwrap for name in ATTITUDE
 }
 """Angles that recorders let jump by a turn, and what takes the jumps out: roll and heading count from their first value."""
 
@@ -105,8 +105,9 @@ def _check_mirrored(
     source: Source, mapping: MappingFile, series: dict[str, Series], clock: Series | None
 ) -> None:
     """Refuse a mean of two surfaces that cancels the elevator; weights state that a mean is meant."""
-    for name in ("elevator_rad", "elevator_command_rad"):
-        one, q = mapping.channels.get(name), series.get("q_rad_s")
+    (control,) = LONGITUDINAL.controls
+    for name in (control.channel, control.command):
+        one, q = mapping.channels.get(name), series.get(control.damped)
         if one is None or q is None or q.constant or len(one.places) != 2 or one.weights:
             continue
         times, read = _calibrated_columns(source, mapping, name, one, clock)
@@ -197,8 +198,8 @@ def _attitude(
         )
     scalar_first = read if one.order == "wxyz" else read[[3, 0, 1, 2]]
     phi, theta, psi = euler_angles(scalar_first, frame=one.frame, rotates=one.rotates)
-    values = {"theta_rad": theta, "phi_rad": _unwrapped(phi), "psi_rad": _unwrapped(psi)}
-    return {name: replace(times, values=angle) for name, angle in values.items()}
+    angles = (theta, _unwrapped(phi), _unwrapped(psi))
+    return {name: replace(times, values=angle) for name, angle in zip(ATTITUDE, angles, strict=True)}
 
 
 def _unwrapped(angle_rad: Array, without_jumps: Callable[[Array], Array] = np.unwrap) -> Array:
@@ -218,7 +219,9 @@ def _body_velocity(
     read = read * unit_factor("speed", one.unit)
     v = read[1] if one.v is not None else np.zeros(len(times.t_s))
     speed, alpha, beta = air_angles(read[0], v, read[-1])
-    values = {"airspeed_m_s": speed, "alpha_rad": alpha} | ({"beta_rad": beta} if one.v is not None else {})
+    values = {"airspeed_m_s": speed, LONGITUDINAL.vane: alpha} | (
+        {LATERAL.vane: beta} if one.v is not None else {}
+    )
     return {name: replace(times, values=value) for name, value in values.items()}
 
 

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import REQUIRED, SIGNALS
+from airtruth.channels import SIGNALS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LONGITUDINAL
@@ -104,7 +104,7 @@ def row_problems(log: FlightLog) -> Iterator[str]:
 
 def _missing(log: FlightLog) -> Iterator[str]:
     present = [name for name in log.channels if name not in SIGNALS]
-    for name in REQUIRED:
+    for name in LONGITUDINAL.required:
         if name not in log.channels:
             near = difflib.get_close_matches(name, present, n=1, cutoff=0.5)
             step = f"the nearest column is {near[0]!r}: map it" if near else "map a column to it"

@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import REQUIRED
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.histories import Histories, History
 from airtruth.physics.motion import LONGITUDINAL, Motion, motion_with
@@ -31,7 +30,7 @@ def inputs_of(motion: Motion) -> tuple[str, ...]:
     controls = [name for c in motion.controls for name in (c.channel, c.command)]
     known = [name for name in motion.known if name not in _FLOWN.get(motion.name, ())]
     outputs = {output.channel for output in motion.outputs}
-    of_every_log = [name for name in REQUIRED if name not in outputs]
+    of_every_log = [name for name in LONGITUDINAL.required if name not in outputs]
     return tuple(dict.fromkeys((*_ALWAYS, *controls, *known, *of_every_log)))
 
 

@@ -118,9 +118,29 @@ class Motion:
         return tuple(output.channel for output in self.outputs)
 
     @cached_property
+    def surfaces(self) -> tuple[str, ...]:
+        """Columns of the controls."""
+        return tuple(control.channel for control in self.controls)
+
+    @cached_property
+    def commands(self) -> tuple[str, ...]:
+        """Columns of the commands of the controls."""
+        return tuple(control.command for control in self.controls)
+
+    @cached_property
+    def vane(self) -> str:
+        """Column of the vane that measures the flow angle."""
+        return next(output.channel for output in self.outputs if output.instrument == "vane")
+
+    @cached_property
+    def gyros(self) -> tuple[str, ...]:
+        """Columns of the angular rates among the outputs."""
+        return tuple(output.channel for output in self.outputs if output.instrument == "gyro")
+
+    @cached_property
     def channels(self) -> tuple[str, ...]:
         """Columns of outputs and controls."""
-        return (*self.output_channels, *(control.channel for control in self.controls))
+        return (*self.output_channels, *self.surfaces)
 
     @cached_property
     def neutral(self) -> Mapping[str, float]:
@@ -286,12 +306,7 @@ LONGITUDINAL: Final = Motion(
 LATERAL: Final = Motion(
     name="lateral",
     heading="Lateral-directional motion",
-    states=(
-        State("beta", "beta_rad"),
-        State("p", "p_rad_s"),
-        State("r", "r_rad_s"),
-        State("phi", "phi_rad"),
-    ),
+    states=(State("beta", "beta_rad"), State("p", "p_rad_s"), State("r", "r_rad_s"), State("phi", "phi_rad")),
     controls=(
         Control("aileron", "aileron_rad", "aileron_command_rad", "aileron_actuator", "da", "p_rad_s"),
         Control("rudder", "rudder_rad", "rudder_command_rad", "rudder_actuator", "dr", "r_rad_s"),
@@ -349,7 +364,7 @@ MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType(_MOTIONS)
 """Name -> motion, in the order of answers."""
 
 
-VANES: Final = frozenset(y.channel for m in MOTIONS.values() for y in m.outputs if y.instrument == "vane")
+VANES: Final = frozenset(motion.vane for motion in MOTIONS.values())
 """Columns of the vanes of every motion."""
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -14,8 +14,10 @@ from airtruth.aircraft import Aircraft
 from airtruth.aircraft.model import SurfaceProperties
 from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, FlightError
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.attitude import straight_attitude
-from airtruth.simulation.lateral_feedback import LateralFeedback, Loop
+from airtruth.simulation.lateral_feedback import FED, LateralFeedback, Loop
 from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
@@ -33,15 +35,14 @@ class LateralInputs:
 
     Attributes
     ----------
-    aileron_rad, rudder_rad : commands, deviations from trim [rad]; aileron (right - left)/2, trailing edges down positive,
-        rudder trailing edge left positive.
+    commands_rad : control -> command, deviation from trim [rad]; aileron (right - left)/2, trailing edges down positive,
+        rudder trailing edge left positive. A control without an entry keeps its trim.
     gust_v_m_s : velocity of the air to the right of the flight direction [m/s], or None.
     gust_p_rad_s, gust_r_rad_s : rotation of the air about body x and z [rad/s], or None.
     feedback : yaw damper and bank hold, or None.
     """
 
-    aileron_rad: Array
-    rudder_rad: Array
+    commands_rad: Mapping[str, Array]
     gust_v_m_s: Array | None = None
     gust_p_rad_s: Array | None = None
     gust_r_rad_s: Array | None = None
@@ -100,11 +101,11 @@ class Flight:
         self._elevator = model.elevator
         self._augmentation = model.augmentation
         self._rotary = model.rotary_gust
-        self._lateral: list[SurfaceProperties] = []
+        self._lateral: dict[str, SurfaceProperties] = {}
         read = [*READ, model.elevator.surface]
         if trim.condition.six_axes:
-            self._lateral = [surface for surface in (model.aileron, model.rudder) if surface is not None]
-            read += [*READ_LATERAL, *(surface.surface for surface in self._lateral)]
+            self._lateral = model.surfaces(LATERAL)
+            read += [*READ_LATERAL, *(surface.surface for surface in self._lateral.values())]
         self._read = executive.nodes(read)
 
     def fly(self, inputs: Inputs) -> dict[str, Array]:
@@ -135,22 +136,22 @@ class Flight:
         own, controls, mass = len(READ) + 1, self.trim.controls, self.trim.mass_kg
         command = inputs.command_rad[:: self._record_every]
         result = channels(columns[:own], mass, self._elevator.surface_rad) | {
-            "elevator_command_rad": controls.elevator_command_rad + command,
+            LONGITUDINAL.commands[0]: controls.command(ELEVATOR) + command,
             "throttle": np.full(columns.shape[1], controls.throttle),
         }
         if not self._lateral:
             return result
-        result |= lateral_channels(columns[own:], mass, *(surface.surface_rad for surface in self._lateral))
-        names = ("aileron_command_rad", "rudder_command_rad")
+        result |= lateral_channels(
+            columns[own:], mass, [surface.surface_rad for surface in self._lateral.values()]
+        )
         commands = (c[:: self._record_every] for c in self._lateral_commands(inputs))
-        return result | dict(zip(names, commands, strict=True))
+        return result | dict(zip(LATERAL.commands, commands, strict=True))
 
-    def _lateral_commands(self, inputs: Inputs) -> tuple[Array, Array]:
-        """Commands of aileron and rudder at every step [rad]."""
-        at, lateral = self.trim.controls, inputs.lateral
+    def _lateral_commands(self, inputs: Inputs) -> list[Array]:
+        """Commands of the lateral controls at every step [rad]."""
+        given = {} if inputs.lateral is None else inputs.lateral.commands_rad
         still = np.zeros_like(inputs.command_rad)
-        aileron, rudder = (still, still) if lateral is None else (lateral.aileron_rad, lateral.rudder_rad)
-        return at.aileron_command_rad + aileron, at.rudder_command_rad + rudder
+        return [self.trim.controls.command(name) + given.get(name, still) for name in self._lateral]
 
     @property
     def _theta_rad(self) -> float:
@@ -176,8 +177,8 @@ class Flight:
         fdm.set_trim_status(True)
         fdm.reset_to_initial_conditions(2)  # a reset without run_ic, which settle() does
         executive.configure()
-        first = controls.elevator_command_rad + float(inputs.command_rad[0])
-        executive.hold(replace(controls, elevator_command_rad=first))
+        first = controls.command(ELEVATOR) + float(inputs.command_rad[0])
+        executive.hold(controls.moved({ELEVATOR: first}))
         self._engage(inputs)
         for setter, values in zip(setters[1:], series[1:], strict=True):
             setter(float(values[0]))
@@ -213,7 +214,7 @@ class Flight:
         """The feedback of a run, connected to the motion."""
         if inputs.lateral is None or inputs.lateral.feedback is None:
             return None
-        motion = self._executive.nodes([SIGNALS[name].jsbsim for name in ("p_rad_s", "r_rad_s", "phi_rad")])
+        motion = self._executive.nodes([SIGNALS[name].jsbsim for name in FED])
         reads = [node.get_double_value for node in motion]
         return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.bank_rad, reads)
 
@@ -222,7 +223,7 @@ class Flight:
     ) -> tuple[list[Callable[[float], object]], list[Array]]:
         """Setters and their values at every step; the elevator first."""
         executive, elevator = self._executive, self._elevator
-        absolute = self.trim.controls.elevator_command_rad + inputs.command_rad
+        absolute = self.trim.controls.command(ELEVATOR) + inputs.command_rad
         pairs = [
             (elevator.command, _in_time(elevator, absolute, inputs)),
             ("atmosphere/gust-north-fps", inputs.gust_u_m_s / FT),
@@ -238,18 +239,20 @@ class Flight:
             pairs.append((self._augmentation.q_error, inputs.q_error_rad_s))
         if self._augmentation is not None and inputs.theta_error_rad is not None:
             pairs.append((self._augmentation.theta_error, inputs.theta_error_rad))
-        aileron = len(pairs)
+        first = len(pairs)
         if self._lateral:
             pairs += self._lateral_inputs(inputs)
         setters = [executive.node(name).set_double_value for name, _ in pairs]
         if loop is not None:
-            fed = slice(aileron, aileron + len(self._lateral))
-            setters[fed] = loop.added(setters[fed], [surface.command_per_rad for surface in self._lateral])
+            fed = slice(first, first + len(self._lateral))
+            setters[fed] = loop.added(
+                setters[fed], [surface.command_per_rad for surface in self._lateral.values()]
+            )
         return setters, [np.asarray(values, dtype=np.float64) for _, values in pairs]
 
     def _lateral_inputs(self, inputs: Inputs) -> list[tuple[str, Array]]:
         """Properties and values of the lateral inputs, the commands of aileron and rudder first."""
-        commands = zip(self._lateral, self._lateral_commands(inputs), strict=True)
+        commands = zip(self._lateral.values(), self._lateral_commands(inputs), strict=True)
         pairs = [(surface.command, _in_time(surface, values, inputs)) for surface, values in commands]
         lateral, model = inputs.lateral, self._executive.model
         if lateral is None:

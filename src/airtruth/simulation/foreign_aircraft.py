@@ -23,12 +23,15 @@ from airtruth.aircraft.model import (
 )
 from airtruth.aircraft.probe import Constants, wheel_root
 from airtruth.aircraft.write import require_new
+from airtruth.channels import LATERAL, SIGNALS
 from airtruth.errors import AircraftError, StoreError, choices
 from airtruth.isolation.client import call
 from airtruth.isolation.limits import ProcessLimits
 from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.quantity import Quantity
 from airtruth.simulation.survey import words
 from airtruth.simulation.survey.words import REPORT
@@ -42,24 +45,10 @@ _LIMITS: Final = ProcessLimits(seconds=900.0, memory_bytes=4_000_000_000)
 """Limits of a survey (judgement: four engines and a slow machine need two minutes)."""
 _STICK_RAD: Final = 25.0 * DEG
 """Travel of the surface per unit of the stick where a fly-by-wire is bypassed [rad] (judgement: that of a fighter)."""
-_SENSORS: Final = {
-    "alpha_rad": 0.05 * DEG,
-    "q_rad_s": 0.05 * DEG,
-    "az_m_s2": 0.005 * G0,
-    "elevator_rad": 0.02 * DEG,
-}
-"""Noise of the sensors of a new aircraft [units of the channels] (judgement: good flight-test instruments)."""
-_LATERAL_SENSORS: Final = {
-    "beta_rad": 0.05 * DEG,
-    "p_rad_s": 0.05 * DEG,
-    "r_rad_s": 0.05 * DEG,
-    "phi_rad": 0.05 * DEG,
-    "psi_rad": 0.05 * DEG,
-    "ay_m_s2": 0.005 * G0,
-    "aileron_rad": 0.02 * DEG,
-    "rudder_rad": 0.02 * DEG,
-}
-"""The same for the lateral motion."""
+_NOISE: Final = {"angle": 0.05 * DEG, "angular_rate": 0.05 * DEG, "acceleration": 0.005 * G0}
+"""Dimension -> noise of the sensors of a new aircraft [SI] (judgement: good flight-test instruments)."""
+_SURFACE_NOISE_RAD: Final = 0.02 * DEG
+"""The same of a control surface [rad]."""
 
 
 @dataclass(frozen=True)
@@ -285,7 +274,13 @@ def _stated(kind: type[SurfaceProperties], found: Mapping[str, Any]) -> dict[str
 
 
 def _sensors(lateral: bool) -> dict[str, Sensor]:
-    noise = _SENSORS | (_LATERAL_SENSORS if lateral else {})
+    aside = (name for name in LATERAL if name not in MOTION.commands)
+    noise = {
+        name: _SURFACE_NOISE_RAD
+        if name in (*LONGITUDINAL.surfaces, *MOTION.surfaces)
+        else _NOISE[SIGNALS[name].dimension]
+        for name in (*LONGITUDINAL.channels, *(aside if lateral else ()))
+    }
     source = "assumed by airtruth"
     return {name: Sensor(noise_std=Quantity(value=std, source=source)) for name, std in noise.items()}
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.aircraft.model import SurfaceProperties
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
 
@@ -30,17 +30,17 @@ def commands_for(executive: Executive, at: Trim, control: str, surface: Array) -
     control : "elevator", "aileron" or "rudder", which the model has.
     surface : wanted (steps,) [rad].
     """
-    key, held = f"{control}_command_rad", getattr(at.controls, f"{control}_command_rad")
-    offset = held - getattr(at, f"{control}_rad")
+    held = at.controls.command(control)
+    offset = held - at.surfaces_rad[control]
     if getattr(executive.model, control).feedback:
         return np.asarray(surface + offset)
     low, high = float(surface.min()) + offset, float(surface.max()) + offset
     commands = np.union1d(np.linspace(low - _BEYOND_RAD, high + _BEYOND_RAD, _GEARING), [held, 0.0])
     reached = []
     for command in commands:
-        controls = replace(at.controls, **{key: float(command)})
-        executive.initialise(at.condition, at.alpha_rad, controls, 0.0, 0.0)
-        reached.append(getattr(executive.respond(), f"{control}_rad"))
+        controls = at.controls.moved({control: float(command)})
+        executive.initialise(at.condition, at.alpha_rad, controls, engines_s=0.0)
+        reached.append(executive.respond().surfaces_rad[control])
     rising = np.maximum.accumulate(reached)
     kept = np.append(True, np.diff(rising) > _SAME_RAD)
     if kept.sum() < 2:
@@ -50,4 +50,30 @@ def commands_for(executive: Executive, at: Trim, control: str, surface: Array) -
     return np.asarray(surface + offset if linear else found)
 
 
-__all__ = ["commands_for"]
+class FollowedSurface:
+    """A surface that follows a record; augmentation of the model that moves it is compensated by the integral of its error.
+
+    Parameters
+    ----------
+    executive : at the start of the record; surface : properties.
+    commands, wanted : (steps,) command that puts the surface where it was measured, and the measured surface [rad].
+    """
+
+    def __init__(
+        self, executive: Executive, surface: SurfaceProperties, commands: Array, wanted: Array
+    ) -> None:
+        self._command = executive.node(surface.command).set_double_value
+        self._position = executive.node(surface.surface).get_double_value
+        self._commands: list[float] = (commands * surface.command_per_rad).tolist()
+        self._wanted: list[float] = (wanted / surface.surface_rad).tolist()
+        self._gain = surface.surface_rad * surface.command_per_rad if surface.feedback else 0.0
+        self._error = 0.0
+
+    def move(self, step: int) -> None:
+        """Write the command of a step."""
+        if self._gain:
+            self._error += self._gain * (self._wanted[step - 1] - self._position())
+        self._command(self._commands[step] + self._error)
+
+
+__all__ = ["FollowedSurface", "commands_for"]

@@ -4,39 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.channels import LATERAL
+from airtruth.channels import LATERAL, PITCH_PLANE
 from airtruth.physics import sensors
+from airtruth.physics.motion import LATERAL as MOTION
 from airtruth.physics.readings import reading_increments
 from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.terms import ReadingTerm, StateTerm
 
 Array = NDArray[np.float64]
 
-LOGGED: Final = (
-    "airspeed_m_s",
-    "alpha_rad",
-    "theta_rad",
-    "q_rad_s",
-    "ax_m_s2",
-    "az_m_s2",
-    "elevator_rad",
-    "elevator_command_rad",
-    "throttle",
-    "altitude_m",
-    "density_kg_m3",
-)
-"""Channels of a log in the pitch plane, in the order of its columns."""
-
 
 def logged(lateral: bool) -> tuple[str, ...]:
     """Channels of the log of a flight, with the lateral ones where it rolls and yaws."""
-    return (*LOGGED, *LATERAL) if lateral else LOGGED
+    return (*PITCH_PLANE, *LATERAL) if lateral else PITCH_PLANE
 
 
 @dataclass(frozen=True)
@@ -111,7 +96,7 @@ def log_channels(
     """
     result = {}
     more = {} if readings is None else readings.increments(truth, dt_s)
-    for name in logged("beta_rad" in truth):
+    for name in logged(MOTION.vane in truth):
         values = truth[name]
         if name in fitted:
             values = sensors.at_instrument(name, truth, fitted[name]) + more.get(name, 0.0)

@@ -14,9 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
 
@@ -27,21 +30,23 @@ class LateralFeedback:
 
     Attributes
     ----------
-    p_error_rad_s, r_error_rad_s, phi_error_rad : (samples,) errors of the sensors at the steps of the simulation.
+    errors : (samples,) each, errors of the sensors of p, r [rad/s] and phi [rad] at the steps of the simulation.
     yaw_damper_gain_s, roll_damper_gain_s : rudder per yaw rate, aileron per roll rate [s].
     bank_gain : aileron per bank [-].
     washout_s : time constant of the high pass of the yaw rate [s]; 0 for none.
     every : simulation steps between two samples.
     """
 
-    p_error_rad_s: Array
-    r_error_rad_s: Array
-    phi_error_rad: Array
+    errors: tuple[Array, Array, Array]
     yaw_damper_gain_s: float = 0.0
     roll_damper_gain_s: float = 0.0
     bank_gain: float = 0.0
     washout_s: float = 0.0
     every: int = 1
+
+
+FED: Final = (*LATERAL.gyros, "phi_rad")
+"""Channels whose sensors the feedback reads."""
 
 
 class Loop:
@@ -56,7 +61,7 @@ class Loop:
 
     Attributes
     ----------
-    aileron_rad, rudder_rad : present feedback [rad].
+    angles_rad : present feedback to aileron and rudder [rad].
     setters : those that `added` returned.
     """
 
@@ -67,7 +72,7 @@ class Loop:
         period = dt_s * feedback.every
         self._forget = math.exp(-period / feedback.washout_s) if feedback.washout_s else 1.0
         self._slow_rad_s = 0.0
-        self.aileron_rad = self.rudder_rad = 0.0
+        self.angles_rad = (0.0, 0.0)
         self.setters: tuple[Callable[[float], object], ...] = ()
 
     def sample(self, step: int) -> None:
@@ -83,13 +88,12 @@ class Loop:
         f = self._feedback
         if step % f.every:
             return
-        p, r, phi = (read() for read in self._motion)
-        p += float(f.p_error_rad_s[step])
-        r += float(f.r_error_rad_s[step])
-        phi += float(f.phi_error_rad[step])
+        p, r, phi = (read() + float(e[step]) for read, e in zip(self._motion, f.errors, strict=True))
         self._slow_rad_s = self._forget * self._slow_rad_s + (1.0 - self._forget) * r
-        self.rudder_rad = f.yaw_damper_gain_s * (r - self._slow_rad_s)
-        self.aileron_rad = f.bank_gain * (phi - self._bank_rad) + f.roll_damper_gain_s * p
+        self.angles_rad = (
+            f.bank_gain * (phi - self._bank_rad) + f.roll_damper_gain_s * p,
+            f.yaw_damper_gain_s * (r - self._slow_rad_s),
+        )
 
     def added(
         self, setters: Sequence[Callable[[float], object]], per_rad: Sequence[float]
@@ -101,10 +105,10 @@ class Loop:
         setters : set the properties of the commands of aileron and rudder.
         per_rad : units of each property per radian.
         """
-        (aileron, rudder), (per_aileron, per_rudder) = setters, per_rad
-        self.setters = (
-            lambda value: aileron(value + self.aileron_rad * per_aileron),
-            lambda value: rudder(value + self.rudder_rad * per_rudder),
+        numbered = enumerate(zip(setters, per_rad, strict=True))
+        self.setters = tuple(
+            lambda value, i=i, add=add, per=per: add(value + self.angles_rad[i] * per)  # type: ignore[misc]
+            for i, (add, per) in numbered
         )
         return self.setters
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -95,13 +95,13 @@ def _answer(executive: Executive, trim: Trim, motion: Motion, change: Mapping[st
     executive = executive.again()
     off = {signal.channel: change.get(signal.name, 0.0) for signal in motion.signals}
     at = trim.controls
-    commands = {c.command: getattr(at, c.command) + off.pop(c.channel) for c in motion.controls}
-    alpha = trim.alpha_rad + off.pop("alpha_rad", 0.0)
-    sideslip = at.sideslip_rad + off.pop("beta_rad", 0.0)
-    executive.initialise(trim.condition, alpha, replace(at, sideslip_rad=sideslip, **commands), **off)
+    commands = {c.name: at.command(c.name) + off.pop(c.channel) for c in motion.controls}
+    alpha = trim.alpha_rad + off.pop(LONGITUDINAL.vane, 0.0)
+    sideslip = at.sideslip_rad + off.pop(LATERAL.vane, 0.0)
+    executive.initialise(trim.condition, alpha, at.moved(commands, sideslip_rad=sideslip), off)
     answered = _coefficients(executive, trim) if motion is LATERAL else _accelerations(executive, trim, alpha)
     response = executive.respond()
-    return np.array([*answered, *(getattr(response, c.channel) for c in motion.controls)])
+    return np.array([*answered, *(response.surfaces_rad[c.name] for c in motion.controls)])
 
 
 def _accelerations(executive: Executive, trim: Trim, alpha: float) -> tuple[float, ...]:
@@ -188,7 +188,7 @@ def lateral_truth(linear: Linearisation | None, trim: Trim | None) -> dict[str, 
     result |= {name: np.nan if linear is None else linear.modes[name] for name in LATERAL.modal}
     at = None if trim is None else trim.controls
     return result | {
-        **{f"trim_{c.channel}": getattr(trim, c.channel) if trim else np.nan for c in LATERAL.controls},
+        **{f"trim_{c.channel}": trim.surfaces_rad[c.name] if trim else np.nan for c in LATERAL.controls},
         "trim_phi_rad": at.bank_rad if at else np.nan,
         "trim_beta_rad": at.sideslip_rad if at else np.nan,
     }

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
+from airtruth.physics.motion import LATERAL
+from airtruth.physics.terms import ELEVATOR
 
 Array = NDArray[np.float64]
 
 
-ELEVATOR: Final = "elevator"
-"""Control of the pitch plane."""
-LATERAL_CONTROLS: Final = ("aileron", "rudder")
+LATERAL_CONTROLS: Final = tuple(control.name for control in LATERAL.controls)
 """Controls of the lateral-directional motion."""
 CONTROLS: Final = (ELEVATOR, *LATERAL_CONTROLS)
 """Controls that a manoeuvre moves."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Final
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError
-from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
+from airtruth.simulation.simulator import AT_REST, Condition, Controls, Executive, SimulatorResponse
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG, G0, LBF
 
@@ -93,7 +95,7 @@ def grid_about(
 
     return ForceGrid(
         alpha_rad=whole(trim.alpha_rad, alpha_rad, DEG),
-        command_rad=whole(trim.controls.elevator_command_rad, command_rad, DEG),
+        command_rad=whole(trim.controls.command(ELEVATOR), command_rad, DEG),
         q_rad_s=whole(0.0, q_rad_s, 12.0 * DEG),
         airspeed=np.array([0.95, 1.0, 1.05]),
     )
@@ -122,12 +124,12 @@ def probe(
     axes = (
         _with(grid.airspeed, 1.0) * trim.airspeed_m_s,
         _with(grid.alpha_rad, trim.alpha_rad),
-        _with(grid.command_rad, trim.controls.elevator_command_rad),
+        _with(grid.command_rad, trim.controls.command(ELEVATOR)),
         _with(grid.q_rad_s, 0.0),
     )
     forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
     inertia = aircraft.constants.inertia_yy_kg_m2
-    states = HeldStates(executive, trim)
+    states, (rate,) = HeldStates(executive, trim), LONGITUDINAL.gyros
     values = np.empty((*(axis.size for axis in axes), 3))
     surface = np.empty(values.shape[:-1])
     # commands innermost: they cost the least
@@ -135,9 +137,9 @@ def probe(
         at = (i, j, k, n)
         v, alpha, command, q = (float(axis[m]) for axis, m in zip(axes, at, strict=True))
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * v / trim.airspeed_m_s)
-        controls = replace(trim.controls, elevator_command_rad=command)
-        answer = states.respond(condition, alpha, controls, q)
-        surface[at] = answer.elevator_rad
+        controls = trim.controls.moved({ELEVATOR: command})
+        answer = states.respond(condition, alpha, controls, {rate: q})
+        surface[at] = answer.surfaces_rad[ELEVATOR]
         values[at] = [*(node.get_double_value() * LBF for node in forces), answer.q_dot_rad_s2 * inertia]
     return ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values)
 
@@ -159,7 +161,7 @@ def with_breaks(aircraft: Aircraft, trim: Trim, grid: ForceGrid, dt_s: float = 1
     states = HeldStates(executive, trim)
 
     def at(alpha: float) -> Array:
-        answer = states.respond(trim.condition, alpha, trim.controls, 0.0)
+        answer = states.respond(trim.condition, alpha, trim.controls)
         return np.array([force.get_double_value(), answer.q_dot_rad_s2])
 
     return replace(grid, alpha_rad=with_breaks_of(at, grid.alpha_rad))
@@ -280,7 +282,7 @@ def forces_over_alpha(
     values = np.empty((ratios.size, alpha_rad.size, 3))
     for i, j in np.ndindex(values.shape[:2]):
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * float(ratios[i]))
-        answer = states.respond(condition, float(alpha_rad[j]), trim.controls, 0.0)
+        answer = states.respond(condition, float(alpha_rad[j]), trim.controls)
         moment = answer.q_dot_rad_s2 * aircraft.constants.inertia_yy_kg_m2
         values[i, j] = [*(node.get_double_value() * LBF for node in forces), moment]
     return values
@@ -302,7 +304,7 @@ class HeldStates:
         if executive.model.engine_start_s > 0.0:
             executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
             steady = executive.respond()
-            executive.initialise(trim.condition, trim.alpha_rad, trim.controls, 0.0, _FILTERS_S)
+            executive.initialise(trim.condition, trim.alpha_rad, trim.controls, engines_s=_FILTERS_S)
             self.loses_power = executive.respond().differs(steady) > _SAME_RESPONSE
         self.motion: tuple[object, ...] | None = None
 
@@ -311,37 +313,30 @@ class HeldStates:
         condition: Condition,
         alpha_rad: float,
         controls: Controls,
-        q_rad_s: float,
-        *,
-        p_rad_s: float = 0.0,
-        r_rad_s: float = 0.0,
+        rates_rad_s: Mapping[str, float] = AT_REST,
     ) -> SimulatorResponse:
         """Response in a state of the grid."""
-        rates = (q_rad_s, p_rad_s, r_rad_s)
         if not self.holds:
-            return self._settled(condition, alpha_rad, controls, rates)
-        command = controls.elevator_command_rad
-        wanted = self.trim.elevator_rad + command - self.trim.controls.elevator_command_rad
+            return self._settled(condition, alpha_rad, controls, rates_rad_s)
+        command = controls.command(ELEVATOR)
+        wanted = self.trim.elevator_rad + command - self.trim.controls.command(ELEVATOR)
         for _ in range(_HOLDS):
-            answer = self._settled(
-                condition, alpha_rad, replace(controls, elevator_command_rad=command), rates
-            )
-            error = wanted - answer.elevator_rad
+            answer = self._settled(condition, alpha_rad, controls.moved({ELEVATOR: command}), rates_rad_s)
+            error = wanted - answer.surfaces_rad[ELEVATOR]
             if abs(error) < _SAME_SURFACE_RAD:
                 break
             command += error
         return answer
 
     def _settled(
-        self, condition: Condition, alpha_rad: float, controls: Controls, rates: tuple[float, float, float]
+        self, condition: Condition, alpha_rad: float, controls: Controls, rates_rad_s: Mapping[str, float]
     ) -> SimulatorResponse:
-        motion = (condition, alpha_rad, controls.sideslip_rad, controls.bank_rad, rates)
+        motion = (condition, alpha_rad, controls.sideslip_rad, controls.bank_rad, rates_rad_s)
         if self.loses_power and motion == self.motion:
             self.executive.change_controls(controls, _FILTERS_S)
         else:
             settling_s = _POWER_S if self.loses_power else _FILTERS_S
-            q, p, r = rates
-            self.executive.initialise(condition, alpha_rad, controls, q, settling_s, p_rad_s=p, r_rad_s=r)
+            self.executive.initialise(condition, alpha_rad, controls, rates_rad_s, settling_s)
         self.motion = motion
         return self.executive.respond()
 

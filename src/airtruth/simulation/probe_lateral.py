@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.physics.motion import LATERAL
+from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
 from airtruth.simulation.probe import HeldStates, with_breaks_of
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
@@ -81,9 +83,8 @@ class LateralStates:
     @property
     def origin(self) -> Array:
         """(5,) beta [rad], p, r [rad/s], aileron and rudder [rad] of the trim."""
-        return np.array(
-            [self.trim.controls.sideslip_rad, 0.0, 0.0, self.trim.aileron_rad, self.trim.rudder_rad]
-        )
+        surfaces = (self.trim.surfaces_rad[name] for name in LATERAL_CONTROLS)
+        return np.array([self.trim.controls.sideslip_rad, 0.0, 0.0, *surfaces])
 
     def at(self, alpha_rad: float, signals: Array, ratio: float = 1.0) -> Array:
         """(3,) Y [N], L and N [N m] with the surfaces where they are wanted, or at the end of their range.
@@ -92,21 +93,20 @@ class LateralStates:
         ----------
         signals : (5,) as `origin`; ratio : airspeed over that of the trim [-].
         """
-        beta, p, r = map(float, signals[:3])
+        beta, *rates = map(float, signals[:3])
         wanted = signals[3:]
         held, condition = self.trim.controls, self.trim.condition
         if ratio != 1.0:
             condition = replace(condition, eas_m_s=condition.eas_m_s * ratio)
-        command = np.array([held.aileron_command_rad, held.rudder_command_rad]) + wanted - self.origin[3:]
+        command = np.array([held.command(name) for name in LATERAL_CONTROLS]) + wanted - self.origin[3:]
         for _ in range(_HOLDS):
-            controls = replace(
-                held,
-                sideslip_rad=beta,
-                aileron_command_rad=float(command[0]),
-                rudder_command_rad=float(command[1]),
+            controls = held.moved(
+                dict(zip(LATERAL_CONTROLS, command.tolist(), strict=True)), sideslip_rad=beta
             )
-            answer = self._states.respond(condition, alpha_rad, controls, 0.0, p_rad_s=p, r_rad_s=r)
-            error = wanted - np.array([answer.aileron_rad, answer.rudder_rad])
+            answer = self._states.respond(
+                condition, alpha_rad, controls, dict(zip(LATERAL.gyros, rates, strict=True))
+            )
+            error = wanted - np.array([answer.surfaces_rad[name] for name in LATERAL_CONTROLS])
             if np.abs(error).max() < _SAME_SURFACE_RAD:
                 break
             command = command + error

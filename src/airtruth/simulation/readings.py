@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import SIGNALS
+from airtruth.channels import ATTITUDE, LATERAL, PITCH_PLANE, SIGNALS
 from airtruth.errors import FlightError
 from airtruth.physics import atmosphere
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import FT, SLUG
 
 Array = NDArray[np.float64]
 
-_STATE: Final = ("airspeed_m_s", "alpha_rad", "theta_rad", "q_rad_s", "altitude_m", "density_kg_m3")
+_STATE: Final = tuple(name for name in PITCH_PLANE if SIGNALS[name].jsbsim)
 """Channels with a JSBSim property of their own, see `airtruth.channels.LogChannel.jsbsim`."""
 READ: Final = (
     *(SIGNALS[name].jsbsim for name in _STATE),
@@ -23,7 +26,7 @@ READ: Final = (
     "accelerations/qdot-rad_sec2",
 )
 """Properties that `channels` takes, in its order; the surface's own property follows them."""
-_LATERAL_STATE: Final = ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "psi_rad")
+_LATERAL_STATE: Final = tuple(name for name in LATERAL if SIGNALS[name].jsbsim)
 """Lateral channels with a JSBSim property of their own."""
 READ_LATERAL: Final = (
     *(SIGNALS[name].jsbsim for name in _LATERAL_STATE),
@@ -56,39 +59,37 @@ def channels(columns: Array, mass_kg: float, surface_rad: float) -> dict[str, Ar
     acceleration = SLUG * FT / mass_kg
     return result | {
         "ax_m_s2": fx * acceleration,
-        "az_m_s2": fz * acceleration,
+        LONGITUDINAL.outputs[-1].channel: fz * acceleration,
         "q_dot_rad_s2": q_dot,
-        "elevator_rad": surface * surface_rad,
+        LONGITUDINAL.surfaces[0]: surface * surface_rad,
     }
 
 
-def lateral_channels(
-    columns: Array, mass_kg: float, aileron_rad: float, rudder_rad: float
-) -> dict[str, Array]:
+def lateral_channels(columns: Array, mass_kg: float, surfaces_rad: Sequence[float]) -> dict[str, Array]:
     """Convert properties to the lateral channels of a log that exist without sensors, p_dot_rad_s2 and r_dot_rad_s2.
 
     Parameters
     ----------
-    columns : (10, records) values of `READ_LATERAL` and of the properties of aileron and rudder [JSBSim's units].
+    columns : (10, records) values of `READ_LATERAL` and of the properties of the surfaces [JSBSim's units].
     mass_kg : mass of the aircraft [kg].
-    aileron_rad, rudder_rad : radians per unit of the surfaces' properties.
+    surfaces_rad : radians per unit of each surface's property.
 
     Returns
     -------
     dict
         Channel -> (records,) values at the centre of gravity [SI]; bank and heading without jumps of a turn.
     """
-    *state, fy, p_dot, r_dot, aileron, rudder = columns
+    *state, fy, p_dot, r_dot = columns[: len(READ_LATERAL)]
+    surfaces = zip(MOTION.surfaces, columns[len(READ_LATERAL) :], surfaces_rad, strict=True)
     result = {name: column * SIGNALS[name].to_si for name, column in zip(_LATERAL_STATE, state, strict=True)}
-    for name in ("phi_rad", "psi_rad"):
+    for name in ATTITUDE[1:]:
         start = np.remainder(result[name][:1] + np.pi, 2.0 * np.pi) - np.pi
         result[name] = np.unwrap(np.concatenate([start, result[name]]))[1:]
     return result | {
-        "ay_m_s2": fy * (SLUG * FT / mass_kg),
+        MOTION.outputs[-1].channel: fy * (SLUG * FT / mass_kg),
         "p_dot_rad_s2": p_dot,
         "r_dot_rad_s2": r_dot,
-        "aileron_rad": aileron * aileron_rad,
-        "rudder_rad": rudder * rudder_rad,
+        **{name: column * scale for name, column, scale in surfaces},
     }
 
 

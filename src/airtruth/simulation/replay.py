@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import FlightError
-from airtruth.simulation.gearing import commands_for
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
+from airtruth.simulation.gearing import FollowedSurface, commands_for
 from airtruth.simulation.readings import READ, channels, require_sound
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.tracks import Track, as_logged, first_of, fitted_outputs
@@ -54,9 +55,11 @@ def replay(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
     """
     executive = Executive(aircraft, track.dt_s / track.substeps)
     names = list(track.outputs)
-    free = np.array([first_of(track, "alpha_rad", at.alpha_rad), first_of(track, "q_rad_s", 0.0), 0.0])
+    free = np.array(
+        [first_of(track, LONGITUDINAL.vane, at.alpha_rad), first_of(track, LONGITUDINAL.gyros[0], 0.0), 0.0]
+    )
     # the surface about the aircraft's own trim: the offset is free in any case
-    free[2] = at.elevator_rad - float(np.mean(track.elevator_rad[: max(1, track.substeps * 5)]))
+    free[2] = at.elevator_rad - float(np.mean(track.controls_rad[ELEVATOR][: max(1, track.substeps * 5)]))
 
     def fly(x: Array) -> Array:
         logged = as_logged(aircraft, _run(executive, at, track, x), track)
@@ -86,7 +89,7 @@ def flown_through(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array
         If the aircraft has no JSBSim model.
     """
     executive = Executive(aircraft, track.dt_s / track.substeps)
-    first = float(np.mean(track.elevator_rad[: max(1, track.substeps * 5)]))
+    first = float(np.mean(track.controls_rad[ELEVATOR][: max(1, track.substeps * 5)]))
     return _run(executive, at, track, np.array([at.alpha_rad, 0.0, at.elevator_rad - first]))
 
 
@@ -116,9 +119,10 @@ def each_flown_through(
 
 def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str, Array]:
     """One simulation; channels at every step, at the CG, without sensors."""
-    command = commands_for(executive, at, "elevator", track.elevator_rad + free[2])
+    wanted = track.controls_rad[ELEVATOR] + free[2]
+    command = commands_for(executive, at, ELEVATOR, wanted)
     executive = executive.renewed()
-    fdm, elevator = executive.fdm, executive.model.elevator
+    fdm, surface = executive.fdm, executive.model.elevator
     fdm.set_trim_status(True)  # actuators pass their input through
     fdm.reset_to_initial_conditions(2)  # time to zero; initialise() runs the initial conditions
     executive.configure()
@@ -127,62 +131,28 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str,
     executive.initialise(
         at.condition,
         float(free[0]),
-        replace(at.controls, elevator_command_rad=float(command[0])),
-        float(free[1]),
+        at.controls.moved({ELEVATOR: float(command[0])}),
+        {LONGITUDINAL.gyros[0]: float(free[1])},
     )
     executive.choose_integrator()
-    gets = [node.get_double_value for node in executive.nodes([*READ, elevator.surface])]
-    over_ground = executive.nodes(["velocities/v-north-fps", "velocities/v-down-fps"])
-    feedback = (
-        executive.node(elevator.surface).get_double_value,
-        elevator.surface_rad * elevator.command_per_rad,
-    )
-    columns = _stepped(
-        fdm,
-        gets,
-        [node.get_double_value for node in over_ground],
-        (executive.node(elevator.command).set_double_value, gust.set_double_value),
-        (command * elevator.command_per_rad, track.airspeed_m_s / FT),
-        ((track.elevator_rad + free[2]) / elevator.surface_rad, *feedback) if elevator.feedback else None,
-    )
-    require_sound(columns, executive.dt_s, f"{executive.aircraft.name}, flown through a measured surface,")
-    return channels(columns, at.mass_kg, elevator.surface_rad) | {
-        "elevator_command_rad": command,
-        "throttle": np.full(columns.shape[1], at.controls.throttle),
-    }
-
-
-def _stepped(
-    fdm: Any,
-    gets: Sequence[Any],
-    over_ground: Sequence[Any],
-    setters: tuple[Any, Any],
-    series: tuple[Array, Array],
-    feedback: tuple[Array, Any, float] | None,
-) -> Array:
-    """Values of ``gets`` at every step; setters and series are those of the command and of the airspeed.
-
-    Parameters
-    ----------
-    feedback : surface to fly, its getter, and units of the command per unit of it, where augmentation moves it.
-    """
-    north, down = over_ground
-    set_command, set_gust = setters
+    followed = FollowedSurface(executive, surface, command, wanted)
+    gets = [node.get_double_value for node in executive.nodes([*READ, surface.surface])]
+    north, down = executive.nodes(["velocities/v-north-fps", "velocities/v-down-fps"])
     records = [get() for get in gets]
-    error = 0.0
-    for step, (command, airspeed) in enumerate(
-        zip(series[0][1:].tolist(), series[1][1:].tolist(), strict=True)
-    ):
-        if feedback is not None:
-            wanted, surface, gain = feedback
-            error += gain * (float(wanted[step]) - surface())
-        set_command(command + error)
-        sink = down()
-        set_gust(north() - math.sqrt(max(airspeed * airspeed - sink * sink, 0.0)))
+    for step, airspeed in enumerate((track.airspeed_m_s / FT).tolist()[1:], start=1):
+        followed.move(step)
+        sink = down.get_double_value()
+        over_ground = math.sqrt(max(airspeed * airspeed - sink * sink, 0.0))
+        gust.set_double_value(north.get_double_value() - over_ground)
         if not fdm.run():
             raise FlightError(f"the model ended the replay at {fdm.get_sim_time():.3f} s")
         records.extend([get() for get in gets])
-    return np.array(records).reshape(-1, len(gets)).T
+    columns = np.array(records).reshape(-1, len(gets)).T
+    require_sound(columns, executive.dt_s, f"{executive.aircraft.name}, flown through a measured surface,")
+    return channels(columns, at.mass_kg, surface.surface_rad) | {
+        LONGITUDINAL.commands[0]: command,
+        "throttle": np.full(columns.shape[1], at.controls.throttle),
+    }
 
 
 __all__ = ["each_flown_through", "flown_through", "replay"]

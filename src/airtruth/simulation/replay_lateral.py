@@ -8,8 +8,6 @@ flight path at the difference between the simulated speed over ground and the me
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -18,11 +16,12 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError, FlightError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
-from airtruth.simulation.gearing import commands_for
+from airtruth.physics.terms import ELEVATOR
+from airtruth.simulation.gearing import FollowedSurface, commands_for
 from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
 from airtruth.simulation.replay import replay
 from airtruth.simulation.simulator import Executive
-from airtruth.simulation.tracks import LateralTrack, Track, as_logged, first_of, fitted_outputs
+from airtruth.simulation.tracks import Track, as_logged, first_of, fitted_outputs
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
@@ -36,16 +35,12 @@ _GUST: Final = ("atmosphere/gust-north-fps", "atmosphere/gust-east-fps")
 """Horizontal velocity of the air."""
 
 
-def replayed(aircraft: Aircraft, at: Trim, track: Track | LateralTrack) -> dict[str, Array]:
+def replayed(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
     """Replay a record of either motion, as `airtruth.simulation.replay.replay` or `replay_lateral`."""
-    return (
-        replay_lateral(aircraft, at, track)
-        if isinstance(track, LateralTrack)
-        else replay(aircraft, at, track)
-    )
+    return (replay if ELEVATOR in track.controls_rad else replay_lateral)(aircraft, at, track)
 
 
-def replay_lateral(aircraft: Aircraft, at: Trim, track: LateralTrack) -> dict[str, Array]:
+def replay_lateral(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
     """Replay a record and fit its free parameters.
 
     Parameters
@@ -71,9 +66,7 @@ def replay_lateral(aircraft: Aircraft, at: Trim, track: LateralTrack) -> dict[st
     names, head = list(track.outputs), max(1, track.substeps * 5)
     trimmed = (at.controls.sideslip_rad, 0.0, 0.0, at.controls.bank_rad)
     start = [first_of(track, s.channel, at_trim) for s, at_trim in zip(LATERAL.states, trimmed, strict=True)]
-    offsets = [
-        getattr(at, f"{name}_rad") - float(np.mean(own[:head])) for name, own in track.controls_rad.items()
-    ]
+    offsets = [at.surfaces_rad[name] - float(np.mean(own[:head])) for name, own in track.controls_rad.items()]
 
     def fly(x: Array) -> Array:
         logged = as_logged(aircraft, _run(executive, at, track, x), track)
@@ -82,7 +75,7 @@ def replay_lateral(aircraft: Aircraft, at: Trim, track: LateralTrack) -> dict[st
     return fitted_outputs(fly, np.array([*start, *offsets]), _STEPS, track)
 
 
-def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> dict[str, Array]:
+def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str, Array]:
     """One simulation; channels at every step, at the CG, without sensors."""
     beta, p, r, phi, *offsets = free.tolist()
     wanted = {n: own + more for (n, own), more in zip(track.controls_rad.items(), offsets, strict=True)}
@@ -96,26 +89,15 @@ def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> di
     gusts = [node.set_double_value for node in executive.nodes(_GUST)]
     gusts[0]((at.airspeed_m_s - float(track.airspeed_m_s[0])) / FT)
     gusts[1](0.0)
-    first = {f"{name}_command_rad": float(command[0]) for name, command in commands.items()}
-    controls = replace(at.controls, bank_rad=phi, sideslip_rad=beta, **first)
-    executive.initialise(at.condition, at.alpha_rad, controls, p_rad_s=p, r_rad_s=r)
+    first = {name: float(command[0]) for name, command in commands.items()}
+    controls = at.controls.moved(first, bank_rad=phi, sideslip_rad=beta)
+    executive.initialise(at.condition, at.alpha_rad, controls, dict(zip(LATERAL.gyros, (p, r), strict=True)))
     executive.choose_integrator()
     own = len(READ) + 1
     read = [*READ, model.elevator.surface, *READ_LATERAL, *(s.surface for s in surfaces.values())]
     gets = [node.get_double_value for node in executive.nodes(read)]
     ground = [node.get_double_value for node in executive.nodes(_OVER_GROUND)]
-    moved = []
-    for name, surface in surfaces.items():
-        gain = surface.surface_rad * surface.command_per_rad if surface.feedback else 0.0
-        moved.append(
-            _FollowedSurface(
-                executive.node(surface.command).set_double_value,
-                executive.node(surface.surface).get_double_value,
-                (commands[name] * surface.command_per_rad).tolist(),
-                (wanted[name] / surface.surface_rad).tolist(),
-                gain,
-            )
-        )
+    moved = [FollowedSurface(executive, one, commands[name], wanted[name]) for name, one in surfaces.items()]
     records = [get() for get in gets]
     for step, airspeed in enumerate((track.airspeed_m_s / FT).tolist()[1:], start=1):
         for one in moved:
@@ -132,35 +114,13 @@ def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> di
     require_sound(columns, executive.dt_s, f"{executive.aircraft.name}, flown through measured surfaces,")
     scales = [surface.surface_rad for surface in surfaces.values()]
     (pitch,), held = LONGITUDINAL.controls, at.controls
-    still = {pitch.command: held.elevator_command_rad, "throttle": held.throttle}
+    still = {pitch.command: held.command(pitch.name), "throttle": held.throttle}
     return (
         channels(columns[:own], at.mass_kg, model.elevator.surface_rad)
-        | lateral_channels(columns[own:], at.mass_kg, *scales)
+        | lateral_channels(columns[own:], at.mass_kg, scales)
         | {name: np.full(columns.shape[1], value) for name, value in still.items()}
         | {control.command: commands[control.name] for control in LATERAL.controls}
     )
-
-
-class _FollowedSurface:
-    """A surface that follows a record; augmentation of the model that moves it is compensated by the integral of its error."""
-
-    def __init__(
-        self,
-        command: Callable[[float], object],
-        position: Callable[[], float],
-        commands: list[float],
-        wanted: list[float],
-        gain: float,
-    ) -> None:
-        self._command, self._position = command, position
-        self._commands, self._wanted, self._gain = commands, wanted, gain
-        self._error = 0.0
-
-    def move(self, step: int) -> None:
-        """Write the command of a step."""
-        if self._gain:
-            self._error += self._gain * (self._wanted[step - 1] - self._position())
-        self._command(self._commands[step] + self._error)
 
 
 __all__ = ["replay_lateral", "replayed"]

@@ -67,7 +67,7 @@ def linear_point(
     at, linear = trimmed_and_linear(aircraft, straight, dt_s, LATERAL)
     trimmed = {
         LATERAL.flow: at.controls.sideslip_rad,
-        **{c.name: getattr(at, c.channel) for c in LATERAL.controls},
+        **{c.name: at.surfaces_rad[c.name] for c in LATERAL.controls},
         **{s.name: getattr(at, s.channel) for s in LATERAL.known_signals},
     }
     force = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * aircraft.wing_area_m2

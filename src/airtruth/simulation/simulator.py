@@ -7,9 +7,10 @@ the last bits, and a result must not depend on earlier runs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import astuple, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, Literal
 
 import jsbsim
@@ -18,6 +19,7 @@ from airtruth.aircraft import Aircraft, JsbsimModel
 from airtruth.aircraft.model import SurfaceProperties
 from airtruth.aircraft.probe import load_model, model_root
 from airtruth.errors import AircraftError
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.simulation.attitude import straight_attitude
 from airtruth.simulation.quiet import no_files
 from airtruth.units import FT, KT, SLUG
@@ -39,6 +41,16 @@ _STEADY: Final = 1e-9
 engine that settles with a time constant of 10 s is then 4e-8 from its steady state, less than the residual of a trim)."""
 _ENGINE_ROUNDS: Final = 4
 """Steady states of the engines before a run: the thrust of a piston engine is constant after two (measured)."""
+_RATES: Final = dict(
+    zip(
+        (*LATERAL.gyros, *LONGITUDINAL.gyros),
+        ("ic/p-rad_sec", "ic/r-rad_sec", "ic/q-rad_sec"),
+        strict=True,
+    )
+)
+"""Channel of an angular rate -> its initial condition."""
+AT_REST: Final[Mapping[str, float]] = MappingProxyType({})
+"""No angular rate."""
 STOPS: Final = (jsbsim.BaseError, RuntimeError, KeyError)
 """Exceptions that JSBSim raises on a model or a property."""
 _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
@@ -74,40 +86,47 @@ class Condition:
 
 @dataclass(frozen=True)
 class Controls:
-    """Elevator command [rad], trailing edge down positive, and throttle, 0 to 1 [-].
+    """Commands, and the attitude to the air in which they hold the aircraft.
 
-    aileron, rudder : commands that hold an asymmetric aircraft straight in a longitudinal flight, -1 to 1 [-].
-    aileron_command_rad, rudder_command_rad : commands in six axes [rad].
-    bank_rad, sideslip_rad : attitude to the air in which the controls hold the aircraft [rad].
+    Attributes
+    ----------
+    throttle : lever, 0 to 1 [-].
+    commands_rad : control -> command [rad]; a control without an entry is at 0.
+    held : lateral control -> command that holds an asymmetric aircraft straight in a longitudinal flight, -1 to 1 [-].
+    bank_rad, sideslip_rad : attitude [rad].
     """
 
-    elevator_command_rad: float
     throttle: float
-    aileron: float = 0.0
-    rudder: float = 0.0
+    commands_rad: Mapping[str, float] = field(default_factory=dict)
+    held: Mapping[str, float] = field(default_factory=dict)
     bank_rad: float = 0.0
-    aileron_command_rad: float = 0.0
-    rudder_command_rad: float = 0.0
     sideslip_rad: float = 0.0
+
+    def command(self, control: str) -> float:
+        """Command of a control [rad]."""
+        return self.commands_rad.get(control, 0.0)
+
+    def moved(self, commands_rad: Mapping[str, float], **attitude_rad: Any) -> Controls:
+        """The controls with other commands, and with another bank_rad or sideslip_rad."""
+        return replace(self, commands_rad={**self.commands_rad, **commands_rad}, **attitude_rad)
 
 
 @dataclass(frozen=True)
 class SimulatorResponse:
-    """Accelerations in body axes [m/s2], [rad/s2] and the surfaces [rad] in one state."""
+    """Accelerations in body axes [m/s2], [rad/s2], and the control surfaces that fly, by control [rad], in one state."""
 
     u_dot_m_s2: float
     w_dot_m_s2: float
     q_dot_rad_s2: float
-    elevator_rad: float
-    v_dot_m_s2: float = 0.0
-    p_dot_rad_s2: float = 0.0
-    r_dot_rad_s2: float = 0.0
-    aileron_rad: float = 0.0
-    rudder_rad: float = 0.0
+    v_dot_m_s2: float
+    p_dot_rad_s2: float
+    r_dot_rad_s2: float
+    surfaces_rad: Mapping[str, float]
 
     def differs(self, other: SimulatorResponse) -> float:
         """Largest difference to another response [m/s2], [rad/s2], [rad]; infinite where one is not finite."""
-        pairs = zip(astuple(self), astuple(other), strict=True)
+        values = ((*astuple(r)[:-1], *r.surfaces_rad.values()) for r in (self, other))
+        pairs = zip(*values, strict=True)
         return max(d if math.isfinite(d) else math.inf for d in (abs(a - b) for a, b in pairs))
 
 
@@ -197,11 +216,8 @@ class Executive:
         condition: Condition,
         alpha_rad: float,
         controls: Controls,
-        q_rad_s: float = 0.0,
+        rates_rad_s: Mapping[str, float] = AT_REST,
         engines_s: float | None = None,
-        *,
-        p_rad_s: float = 0.0,
-        r_rad_s: float = 0.0,
     ) -> None:
         """Put the aircraft into a state at time zero, with lags, filters and engines settled.
 
@@ -210,9 +226,8 @@ class Executive:
         condition : airspeed, altitude and flight path.
         alpha_rad : angle of attack [rad].
         controls : commands, throttle, bank and sideslip.
-        q_rad_s : pitch rate [rad/s].
+        rates_rad_s : channel of an angular rate -> its value [rad/s]; 0 for one without an entry.
         engines_s : longest time for which engines and filters run, instead of that of the model [s].
-        p_rad_s, r_rad_s : roll and yaw rate [rad/s].
         """
         fdm = self.fdm
         self.six_axes = condition.six_axes
@@ -229,9 +244,7 @@ class Executive:
             ("ic/alpha-rad", alpha_rad),
             ("ic/beta-rad", 0.0),
             ("ic/gamma-rad", condition.gamma_rad),
-            ("ic/p-rad_sec", p_rad_s),
-            ("ic/q-rad_sec", q_rad_s),
-            ("ic/r-rad_sec", r_rad_s),
+            *((name, rates_rad_s.get(channel, 0.0)) for channel, name in _RATES.items()),
         ):
             fdm[name] = value
         if self.six_axes:
@@ -251,21 +264,12 @@ class Executive:
 
     def hold(self, controls: Controls) -> None:
         """Write the controls, the throttle's trim included."""
-        self.fdm[self.model.elevator.command] = (
-            controls.elevator_command_rad * self.model.elevator.command_per_rad
-        )
+        for name, surface in self.surfaces.items():
+            self.fdm[surface.command] = controls.command(name) * surface.command_per_rad
         for name in (*self.model.throttle.command, *self.model.throttle.trim):
             self.fdm[name] = controls.throttle
-        if self.model.lateral is not None:
-            self.fdm[self.model.lateral.aileron] = controls.aileron
-            self.fdm[self.model.lateral.rudder] = controls.rudder
-        if self.six_axes:
-            for surface, command_rad in (
-                (self.model.aileron, controls.aileron_command_rad),
-                (self.model.rudder, controls.rudder_command_rad),
-            ):
-                if surface is not None:
-                    self.fdm[surface.command] = command_rad * surface.command_per_rad
+        for control, name in self.model.lateral or ():
+            self.fdm[name] = controls.held.get(control, 0.0)
 
     def change_controls(self, controls: Controls, engines_s: float) -> None:
         """Write other controls in the present state, and let filters and engines follow for a time [s]."""
@@ -332,19 +336,17 @@ class Executive:
             u_dot_m_s2=fdm["accelerations/udot-ft_sec2"] * FT,
             w_dot_m_s2=fdm["accelerations/wdot-ft_sec2"] * FT,
             q_dot_rad_s2=fdm["accelerations/qdot-rad_sec2"],
-            elevator_rad=fdm[self.model.elevator.surface] * self.model.elevator.surface_rad,
             v_dot_m_s2=fdm["accelerations/vdot-ft_sec2"] * FT,
             p_dot_rad_s2=fdm["accelerations/pdot-rad_sec2"],
             r_dot_rad_s2=fdm["accelerations/rdot-rad_sec2"],
-            aileron_rad=self._angle(self.model.aileron),
-            rudder_rad=self._angle(self.model.rudder),
+            surfaces_rad={name: fdm[s.surface] * s.surface_rad for name, s in self.surfaces.items()},
         )
 
-    def _angle(self, surface: SurfaceProperties | None) -> float:
-        """Angle of a lateral surface [rad]; 0 in the pitch plane."""
-        if surface is None or not self.six_axes:
-            return 0.0
-        return float(self.fdm[surface.surface]) * surface.surface_rad
+    @property
+    def surfaces(self) -> dict[str, SurfaceProperties]:
+        """Control -> properties of its surface, of those that fly: in the pitch plane the elevator alone."""
+        motions = (LONGITUDINAL, LATERAL) if self.six_axes else (LONGITUDINAL,)
+        return {name: s for motion in motions for name, s in self.model.surfaces(motion).items()}
 
     def surroundings(self) -> tuple[float, float, float]:
         """Return true airspeed [m/s], air density [kg/m3] and mass [kg] in the present state."""

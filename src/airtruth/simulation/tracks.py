@@ -1,4 +1,4 @@
-"""ReplayRecord records on the grid of a simulation, and the fit of what is free when one is flown again."""
+"""Records on the grid of a simulation, and the fit of what is free when one is flown again."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ step costs a simulation)."""
 
 
 @dataclass(frozen=True)
-class ReplayRecord:
-    """Outputs of a record and its time base.
+class Track:
+    """A record of a motion.
 
     Attributes
     ----------
@@ -32,39 +32,15 @@ class ReplayRecord:
     substeps : steps of the simulation per sample, see `substeps`.
     outputs : channel -> (samples,) measured values to compare [SI].
     weight : channel -> standard deviation that scales its residual [SI].
+    controls_rad : name of a control -> ((samples - 1) substeps + 1,) on the simulation's grid, the errors of its sensor undone
+        [rad].
+    airspeed_m_s : the same of the airspeed [m/s].
     """
 
     dt_s: float
     substeps: int
     outputs: Mapping[str, Array]
     weight: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Track(ReplayRecord):
-    """A record of the pitch plane.
-
-    Attributes
-    ----------
-    elevator_rad, airspeed_m_s : ((samples - 1) substeps + 1,) on the simulation's grid, the errors of their sensors
-        undone [rad], [m/s].
-    """
-
-    elevator_rad: Array
-    airspeed_m_s: Array
-
-
-@dataclass(frozen=True)
-class LateralTrack(ReplayRecord):
-    """A record of the lateral-directional motion.
-
-    Attributes
-    ----------
-    controls_rad : name of a control -> ((samples - 1) substeps + 1,) on the simulation's grid, the errors of its sensor undone
-        [rad].
-    airspeed_m_s : the same of the airspeed [m/s].
-    """
-
     controls_rad: Mapping[str, Array]
     airspeed_m_s: Array
 
@@ -74,12 +50,12 @@ def substeps(dt_s: float) -> int:
     return max(1, math.ceil(dt_s / STEP_S - 1e-9))
 
 
-def first_of(track: ReplayRecord, channel: str, otherwise: float) -> float:
+def first_of(track: Track, channel: str, otherwise: float) -> float:
     """Mean of the first samples of an output; ``otherwise`` for one that was not measured."""
     return float(np.mean(track.outputs[channel][:5])) if channel in track.outputs else otherwise
 
 
-def as_logged(aircraft: Aircraft, truth: Mapping[str, Array], track: ReplayRecord) -> dict[str, Array]:
+def as_logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Track) -> dict[str, Array]:
     """Readings of the aircraft's sensors in a motion, without noise.
 
     Parameters
@@ -95,7 +71,7 @@ def as_logged(aircraft: Aircraft, truth: Mapping[str, Array], track: ReplayRecor
 
 
 def fitted_outputs(
-    fly: Callable[[Array], Array], free: Array, steps: Array, track: ReplayRecord
+    fly: Callable[[Array], Array], free: Array, steps: Array, track: Track
 ) -> dict[str, Array]:
     """Outputs of a record flown again, its free parameters and a bias of each output fitted by least squares.
 
@@ -132,8 +108,6 @@ def _residual(measured: Array, flown: Array, weight: Array) -> Array:
 
 __all__ = [
     "STEP_S",
-    "LateralTrack",
-    "ReplayRecord",
     "Track",
     "as_logged",
     "first_of",

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
+from airtruth.physics.motion import LATERAL
+from airtruth.physics.terms import ELEVATOR
+from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
 from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
 from airtruth.units import DEG, FT, KT
 
@@ -46,7 +50,7 @@ _STALL: Final = 0.9
 """Reduction of the residual by a step above which such a trim does not get on [-] (judgement)."""
 _PATIENCE: Final = 3
 """Number of such steps after which it ends [-] (judgement)."""
-_NAMES: Final = ("angle of attack", "elevator command", "throttle", "aileron", "rudder", "bank")
+_NAMES: Final = ("angle of attack", f"{ELEVATOR} command", "throttle", *LATERAL_CONTROLS, "bank")
 """Names of the unknowns."""
 
 
@@ -57,24 +61,27 @@ class Trim:
     Attributes
     ----------
     condition : requested flight condition.
-    alpha_rad, elevator_rad : angle of attack and surface [rad].
-    controls : elevator command and throttle.
+    alpha_rad : angle of attack [rad].
+    surfaces_rad : control -> surface [rad], of the controls that fly.
+    controls : commands and throttle.
     airspeed_m_s, density_kg_m3, mass_kg : true airspeed [m/s], air density [kg/m3], mass [kg].
     residual : largest of |u_dot|, |w_dot| [m/s2] and |q_dot| [rad/s2], with lateral properties or in six axes also of
         |v_dot|, |p_dot| and |r_dot|.
-    aileron_rad, rudder_rad : surfaces in six axes [rad].
     """
 
     condition: Condition
     alpha_rad: float
-    elevator_rad: float
+    surfaces_rad: Mapping[str, float]
     controls: Controls
     airspeed_m_s: float
     density_kg_m3: float
     mass_kg: float
     residual: float
-    aileron_rad: float = 0.0
-    rudder_rad: float = 0.0
+
+    @property
+    def elevator_rad(self) -> float:
+        """Surface of the pitch plane [rad]."""
+        return self.surfaces_rad[ELEVATOR]
 
 
 class _Problem:
@@ -89,10 +96,10 @@ class _Problem:
         self.throttle = throttle if model.throttle.command else 0.0
         self.glides = self.throttle is not None
         self.count = 6 if condition.six_axes or model.lateral is not None else 3
-        if condition.six_axes and (model.aileron is None or model.rudder is None):
+        if condition.six_axes and len(model.surfaces(LATERAL)) < len(LATERAL_CONTROLS):
+            needed = " and ".join(f"jsbsim.{name}" for name in LATERAL_CONTROLS)
             raise TrimError(
-                f"{aircraft.name} has no lateral controls: a trim in six axes needs jsbsim.aileron and jsbsim.rudder in "
-                "aircraft.toml"
+                f"{aircraft.name} has no lateral controls: a trim in six axes needs {needed} in aircraft.toml"
             )
         self.thrifty = self.glides or model.engine_start_s > 0.0 or self.count == 6
         self.names = list(_NAMES[: self.count])
@@ -113,13 +120,13 @@ class _Problem:
     def controls(self, x: Array) -> Controls:
         """Controls of a vector of unknowns."""
         throttle = float(x[2]) if self.throttle is None else self.throttle
-        if not self.condition.six_axes:
-            return Controls(float(x[1]), throttle, *map(float, x[3:]))
-        aileron, rudder, angle = map(float, x[3:])
+        commands = {ELEVATOR: float(x[1])}
+        lateral = dict(zip(LATERAL_CONTROLS, map(float, x[3:5]), strict=False))
         free = "sideslip_rad" if self.condition.straight == "wings-level" else "bank_rad"
-        return Controls(
-            float(x[1]), throttle, aileron_command_rad=aileron, rudder_command_rad=rudder, **{free: angle}
-        )
+        angle: dict[str, Any] = {free: float(x[5])} if self.count == 6 else {}
+        if self.condition.six_axes:
+            return Controls(throttle, commands | lateral, **angle)
+        return Controls(throttle, commands, lateral, **angle)
 
     def path(self, x: Array) -> Condition:
         """Condition of a vector of unknowns."""
@@ -191,10 +198,10 @@ def _near(problem: _Problem, trim: Trim | None) -> list[Array]:
         return []
     c = trim.controls
     third = trim.condition.gamma_rad if problem.glides else c.throttle
-    every = [trim.alpha_rad, c.elevator_command_rad, third, c.aileron, c.rudder, c.bank_rad]
-    if problem.condition.six_axes:
-        level = problem.condition.straight == "wings-level"
-        every[3:] = c.aileron_command_rad, c.rudder_command_rad, c.sideslip_rad if level else c.bank_rad
+    lateral = c.commands_rad if problem.condition.six_axes else c.held
+    angle = c.sideslip_rad if problem.condition.straight == "wings-level" else c.bank_rad
+    moved = [lateral.get(name, 0.0) for name in LATERAL_CONTROLS]
+    every = [trim.alpha_rad, c.command(ELEVATOR), third, *moved, angle]
     return [np.array(every[: problem.count])]
 
 
@@ -247,14 +254,12 @@ def _result(problem: _Problem, x: Array) -> Trim:
     return Trim(
         condition=problem.path(x),
         alpha_rad=float(x[0]),
-        elevator_rad=at.elevator_rad,
+        surfaces_rad=at.surfaces_rad,
         controls=problem.controls(x),
         airspeed_m_s=airspeed,
         density_kg_m3=density,
         mass_kg=mass,
         residual=float(np.max(np.abs(problem.accelerations(at)))),
-        aileron_rad=at.aileron_rad,
-        rudder_rad=at.rudder_rad,
     )
 
 

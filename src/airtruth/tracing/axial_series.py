@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.logs.flight_log import FlightLog, batches
 from airtruth.numerics.rates import smooth_rate
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensor_errors import Kind, SensorErrors
 from airtruth.physics.sensors import accelerometer_ax
 from airtruth.physics.terms import Change, SensorTerm, declared_total
@@ -38,7 +39,7 @@ _UNDONE: Final[tuple[Kind, ...]] = ("scale", "bias", "lag", "delay")
 """Its declared errors that are undone before its position counts."""
 _SPEED: Final = "airspeed_m_s"
 """The airspeed, whose accepted errors are undone too."""
-_BIASED: Final = ("alpha_rad", "q_rad_s")
+_BIASED: Final = tuple(output.channel for output in LONGITUDINAL.outputs if not output.late)
 """Channels whose estimated biases are undone, in the order of the records' own parameters."""
 _FINE_RAD: Final = 0.1 * DEG
 """Step of the angle of attack between the points of the tables [rad] (judgement: a tenth of theirs)."""
@@ -174,8 +175,8 @@ def _series(
     neutral = float(plant.neutral_rad[0])
     cells = s.sub * FINE
     surface = through(change.surface_path(), s.elevator_rad, s.dt_s / cells)[::cells]
-    elevator = neutral + factor * (surface - neutral)
-    alpha, q = channels["alpha_rad"], channels["q_rad_s"]
+    surface = neutral + factor * (surface - neutral)
+    alpha, q, az = (channels[name] for name in LONGITUDINAL.output_channels)
     speed, density = s.airspeed_m_s[:: s.sub] * ratio, s.density_kg_m3[:: s.sub]
     pressure = 0.5 * density * speed**2
     half = 0.5 * c.chord_m / speed
@@ -190,21 +191,19 @@ def _series(
         x = looked_up(plant, signals | {FLOW: alpha_rad}, pressure)[:, 0]
         return np.asarray(x + pressure * np.interp(alpha_rad, *between))
 
-    signals = {FLOW: alpha, control: elevator, "qhat": q * half}
+    signals = {FLOW: alpha, control: surface, "qhat": q * half}
     declared = along(alpha)
-    per_alpha, per_elevator = (_slope(plant, name) for name in (FLOW, control))
     t = TOLERANCE
-    shown = _without_noise(alpha, (channels["az_m_s2"], q, elevator))
-    off_alpha, off_elevator = shown - plant.trims[FLOW], elevator - plant.trims[control]
+    shown = _without_noise(alpha, (az, q, surface))
+    angles = ((FLOW, shown, t.alpha_slope), (control, surface, t.elevator_slope))
+    per = {name: _slope(plant, name) for name in (FLOW, control)}
     off_bias = bias_rad if abs(bias_rad) > t.bias_rad else t.bias_rad
     inertial = mass / force
     tolerances = [
-        max(t.share * abs(per_alpha), t.alpha_slope) * off_alpha,
-        max(t.share * abs(per_elevator), t.elevator_slope) * off_elevator,
+        *(max(t.share * abs(per[name]), least) * (x - plant.trims[name]) for name, x, least in angles),
         t.rate_slope * q * half,
         (along(shown + off_bias) - along(shown)) / force,
-        t.late_s * per_alpha * smooth_rate(shown, _RATE_S, s.dt_s),
-        t.late_s * per_elevator * smooth_rate(elevator, _RATE_S, s.dt_s),
+        *(t.late_s * per[name] * smooth_rate(x, _RATE_S, s.dt_s) for name, x, _ in angles),
         t.z_m * inertial * q_dot,
         t.x_m * inertial * q**2,
         t.scale * (declared - declared.mean()) / force,  # not of ax itself, whose noise is that of y

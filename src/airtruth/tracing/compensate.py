@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -24,13 +25,13 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.neutral import fitted
 from airtruth.identification import AircraftConstants
+from airtruth.identification.declared_sensors import moved_to_cg
 from airtruth.identification.record_constants import stated_value
 from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.numerics.prefilter import butterworth
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.readings import increments_over, reading_increments, state_of
-from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.terms import (
     AeroTerm,
     Change,
@@ -276,8 +277,8 @@ def _signals(
             rate = 1.0 if s.length is None else (lengths[s.length] / (2.0 * airspeed))[:, None]
             found[s.name] = channels[s.channel] * rate
     if motion is LONGITUDINAL:
-        alpha = channels["alpha_rad"]
-        found["alpha"] = alpha - _origin(alpha, dt_s, taken)
+        alpha = channels[motion.vane]
+        found[motion.flow] = alpha - _origin(alpha, dt_s, taken)
     found["qbar"] = 0.5 * np.asarray(air_density(channels)) * channels["airspeed_m_s"] ** 2
     return found
 
@@ -289,8 +290,9 @@ def _undo_readings(
     if not taken.readings:
         return
     if taken.motion is LONGITUDINAL:
-        alpha = channels["alpha_rad"]
-        signals = channels | {"alpha_rad": alpha - _origin(alpha, dt_s, taken)}
+        vane = taken.motion.vane
+        alpha = channels[vane]
+        signals = channels | {vane: alpha - _origin(alpha, dt_s, taken)}
         more = reading_increments(taken.readings, taken.states, signals, constants.chord_m, dt_s)
     else:
         more = increments_over(taken.readings, taken.states, _signals(channels, constants, dt_s, taken), dt_s)
@@ -314,12 +316,11 @@ def _undo_sensors(channels: dict[str, Array], terms: Sequence[SensorTerm], dt_s:
     for name, own in errors.items():
         channels[name] = _advanced(own.unscaled(channels[name]), own.lead_s / dt_s)
     if "airspeed_m_s" in errors:
-        channels["airspeed_m_s"] = channels["airspeed_m_s"] / errors["airspeed_m_s"].slope(
-            channels["alpha_rad"]
-        )
+        factor = errors["airspeed_m_s"].slope(channels[LONGITUDINAL.vane])
+        channels["airspeed_m_s"] = channels["airspeed_m_s"] / factor
     for name, own in errors.items():
         if (own.x_m, own.y_m, own.z_m) != (0.0, 0.0, 0.0):
-            channels[name] = channels[name] + _arm(name, own, channels, dt_s)
+            channels[name] = channels[name] + moved_to_cg(name, own, channels, partial(_rate, dt_s=dt_s))
 
 
 def _advanced(x: Array, samples: float) -> Array:
@@ -330,19 +331,6 @@ def _advanced(x: Array, samples: float) -> Array:
     return np.array([np.interp(at + samples, at, row) for row in x])
 
 
-def _arm(name: str, own: SensorErrors, channels: dict[str, Array], dt_s: float) -> Array:
-    """Value at the CG less the reading, by `airtruth.physics.sensors.at_instrument`, to first order in the rates."""
-    airspeed = channels["airspeed_m_s"]
-    if name == "alpha_rad":
-        moved = channels["q_rad_s"] * own.x_m / airspeed
-        return np.asarray(moved - channels["p_rad_s"] * own.y_m / airspeed if own.y_m else moved)
-    if name == "beta_rad":
-        return np.asarray((channels["p_rad_s"] * own.z_m - channels["r_rad_s"] * own.x_m) / airspeed)
-    if name == "ay_m_s2":
-        return own.z_m * _rate(channels["p_rad_s"], dt_s) - own.x_m * _rate(channels["r_rad_s"], dt_s)
-    return own.x_m * _rate(channels["q_rad_s"], dt_s)
-
-
 def _rate(x: Array, dt_s: float) -> Array:
     """(runs, samples) derivative of a low-passed rate [rad/s2]."""
     from scipy.signal import sosfiltfilt
@@ -351,10 +339,10 @@ def _rate(x: Array, dt_s: float) -> Array:
     return np.asarray(np.gradient(smooth, dt_s, axis=1))
 
 
-def _air_surface(terms: tuple[SurfaceTerm, ...], elevator: Array, dt_s: float) -> Array:
+def _air_surface(terms: tuple[SurfaceTerm, ...], surface: Array, dt_s: float) -> Array:
     """(samples,) surface that the air sees [rad]."""
-    at = np.arange(len(elevator), dtype=np.float64)
-    fine = np.interp(np.arange((len(elevator) - 1) * _FINE + 1) / _FINE, at, elevator)
+    at = np.arange(len(surface), dtype=np.float64)
+    fine = np.interp(np.arange((len(surface) - 1) * _FINE + 1) / _FINE, at, surface)
     return np.asarray(through(terms, fine, dt_s / _FINE)[::_FINE])
 
 

@@ -108,9 +108,9 @@ def _with_steady_flight(s: Signals, at: Trim | None) -> Signals:
     if at is None or not s.assumed:
         return s
     steady = {
-        "alpha_rad": at.alpha_rad,
+        LONGITUDINAL.vane: at.alpha_rad,
         "theta_rad": at.alpha_rad + at.condition.gamma_rad,
-        "q_rad_s": 0.0,
+        LONGITUDINAL.gyros[0]: 0.0,
     }
     absent = [name for name in s.assumed if name in steady]
     changed = {name: np.full_like(getattr(s, name), steady[name]) for name in absent}

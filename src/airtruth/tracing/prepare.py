@@ -250,11 +250,12 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
         airspeed = airspeed / declared.slope(alpha)
     known: dict[str, Any] = {}
     if s.motion is not LONGITUDINAL:
+        vane, (gyro,) = LONGITUDINAL.vane, LONGITUDINAL.gyros
         beside = set(s.motion.known) - {"airspeed_m_s", "density_kg_m3"}
         known = {n: true(n, getattr(s, n), s.sub) for n in beside}
-        vane = aircraft.file.sensors.get("alpha_rad", Sensor()).errors()
-        p = fine(s.y[:, s.motion.output_channels.index("p_rad_s")], s.sub)
-        known["alpha_rad"] = known["alpha_rad"] + (vane.x_m * known["q_rad_s"] - vane.y_m * p) / airspeed
+        own = aircraft.file.sensors.get(vane, Sensor()).errors()
+        p = fine(s.y[:, s.motion.output_channels.index(s.motion.gyros[0])], s.sub)
+        known[vane] = known[vane] + (own.x_m * known[gyro] - own.y_m * p) / airspeed
     return replace(
         s,
         **known,

@@ -17,7 +17,7 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.disposable import isolated, isolated_flight
 from airtruth.simulation.replay_lateral import replayed
 from airtruth.simulation.simulator import Condition
-from airtruth.simulation.tracks import LateralTrack, Track, substeps
+from airtruth.simulation.tracks import Track, substeps
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.inference.assess import noise_floor
 from airtruth.tracing.inference.posterior import TraceProblem
@@ -165,7 +165,7 @@ def _lead_s(channel: str, declared: Aircraft, aircraft: Aircraft) -> float:
     return new.errors().lead_s - old.errors().lead_s
 
 
-def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track | LateralTrack:
+def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
     """A record on the simulation's grid, with the errors of the aircraft's sensors undone in its inputs.
 
     Parameters
@@ -196,10 +196,7 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track | Lat
     moved = zip(s.motion.controls, s.controls_rad, strict=True)
     surfaces = {control.name: true(control.channel, own, s.sub * FINE) for control, own in moved}
     airspeed = true("airspeed_m_s", s.airspeed_m_s, s.sub)
-    if s.motion is not LONGITUDINAL:
-        return LateralTrack(s.dt_s, steps, outputs, known, surfaces, airspeed)
-    (elevator,) = surfaces.values()
-    return Track(s.dt_s, steps, outputs, known, elevator, airspeed)
+    return Track(s.dt_s, steps, outputs, known, surfaces, airspeed)
 
 
 __all__ = ["disagreement", "flown_again", "track", "worsened"]

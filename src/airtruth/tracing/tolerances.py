@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.physics.lateral import lateral_scale
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.proof_of_lateral import LateralProof, lateral_proof
 from airtruth.physics.proof_of_match import PITCH, PROOFS, Proof, pitch_change
 from airtruth.tracing.inference.assess import Assessment
@@ -50,7 +50,7 @@ def excursion(
     """
     distances, inside = {}, {}
     if proof.pitch is not None:
-        rate = residual[:, channels.index("q_rad_s")]
+        rate = residual[:, channels.index(LONGITUDINAL.gyros[0])]
         pitch = np.abs(pitch_change(rate, dt_s * np.arange(len(rate), dtype=np.float64)))
         distances[PITCH], inside[PITCH] = float(pitch.max()), pitch <= proof.pitch.absolute
     for channel, own in proof.tolerances.items():
@@ -59,7 +59,7 @@ def excursion(
         distances[channel] = float(distance.max())
         inside[channel] = distance <= own.allowed(measured[:, i])
     # one of pitch angle and pitch rate, and each of the others
-    groups = [[PITCH, "q_rad_s"]] if PITCH in inside else []
+    groups = [[PITCH, *LONGITUDINAL.gyros]] if PITCH in inside else []
     groups += [[name] for name in inside if name not in {n for group in groups for n in group}]
     at_each = np.all([np.any([inside[name] for name in group], axis=0) for group in groups], axis=0)
     within = all(any(bool(inside[name].all()) for name in group) for group in groups)

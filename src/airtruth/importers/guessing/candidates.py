@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import LATERAL
+from airtruth.channels import ATTITUDE, LATERAL
 from airtruth.importers.attitude import continuous, euler_angles
 from airtruth.importers.dictionary import (
     DIMENSIONS,
@@ -24,8 +24,10 @@ from airtruth.importers.dictionary import (
 from airtruth.importers.guessing.columns import Column, GroupClock
 from airtruth.importers.guessing.readings import Candidates, Reading
 from airtruth.importers.guessing.sides import mixed_with, pair
-from airtruth.importers.guessing.slots import ALL_SLOTS, OPPOSITE, SIGN, SIGNED, SLOT_OF, TURNING, size_of
+from airtruth.importers.guessing.slots import ALL_SLOTS, OPPOSITE, SIGN, SIGNED, SLOT_OF, size_of
 from airtruth.physics.atmosphere import altitude_of_pressure_m
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import UNITS
 
 Array = NDArray[np.float64]
@@ -117,7 +119,7 @@ def candidates(
         for channel, evidence, reason in _meanings(column, words):
             if channel == "elevon_rad":
                 found.surfaces.append((column, MIXED))
-                for surface in () if reason else ("elevator_rad", mixed_with(column.name)):
+                for surface in () if reason else (*LONGITUDINAL.surfaces, mixed_with(column.name)):
                     _read(parts_of_pairs, column, surface, evidence, "named", grid, clocks, None)
             elif channel in (*QUATERNION, *VELOCITY):
                 parts.setdefault((column.group, channel), column)
@@ -223,7 +225,7 @@ def _read(
     signs = (fixed,) if fixed else (1, -1) if slot in SIGNED else (1,)
     offset = entry.offset if entry is not None else 0.0
     for unit, likely in likelihoods.items():
-        if channel in TURNING:
+        if channel in ATTITUDE:
             raw = grid.of(column, clocks, 2.0 * np.pi / table[unit])
             assert raw is not None
         for sign in signs:
@@ -299,10 +301,10 @@ def _velocity(
         v = grid.of(three[1], clocks) if len(three) > 2 else None
         made = [
             ("airspeed", "airspeed_m_s", np.hypot(u, w) * table[unit]),
-            ("alpha", "alpha_rad", np.arctan2(w, u)),
+            ("alpha", LONGITUDINAL.vane, np.arctan2(w, u)),
         ]
         if v is not None:
-            made.append(("beta", "beta_rad", np.arctan2(v, np.hypot(u, w))))
+            made.append(("beta", MOTION.vane, np.arctan2(v, np.hypot(u, w))))
         for slot, channel, values in made:
             found.readings.setdefault(slot, []).append(
                 Reading(slot, channel, three, unit, 1, values, EXACT - 1.0 + likely + size_of(slot, values), "named",

@@ -28,6 +28,7 @@ from airtruth.importers.guessing.evidence import (
     moves,
     near,
 )
+from airtruth.physics.motion import LATERAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -102,8 +103,14 @@ _SLIPPED = moved(
     lambda c: c["beta"],
     lambda c, dt: integral(_pull(c) - _turning(c), dt),
 )
-_AILERON = moved("the aileron", "its command", 1, lambda c: c["aileron"], lambda c, dt: c["aileron_command"])
-_RUDDER = moved("the rudder", "its command", 1, lambda c: c["rudder"], lambda c, dt: c["rudder_command"])
+
+
+def _commanded(surface: str) -> SlotRelation:
+    command = f"{surface}_command"
+    follows = moved(f"the {surface}", "its command", 1, lambda c: c[surface], lambda c, dt: c[command])
+    return SlotRelation((surface, command), follows)
+
+
 LATERAL_RELATIONS: Final = (
     SlotRelation(("ay",), _centred),
     SlotRelation(("beta",), _coordinated),
@@ -113,8 +120,7 @@ LATERAL_RELATIONS: Final = (
     SlotRelation(("r", "phi", "ay", "airspeed"), _turned, ("p", "theta", "alpha", "beta")),
     SlotRelation(("aileron", "p"), _rolls, ("r", "beta")),
     SlotRelation(("rudder", "r"), _yaws, ("p", "beta", "ay")),
-    SlotRelation(("aileron", "aileron_command"), _AILERON),
-    SlotRelation(("rudder", "rudder_command"), _RUDDER),
+    *(_commanded(control.name) for control in LATERAL.controls),
 )
 """Everything that is tested of the lateral-directional motion. A relation uses further slots where they are assigned."""
 

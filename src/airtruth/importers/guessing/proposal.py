@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import REQUIRED, SIGNALS
+from airtruth.channels import PITCH_PLANE, SIGNALS
 from airtruth.importers.guessing.assignment import CERTAIN, Decision
 from airtruth.importers.guessing.candidates import MIXED, CommonTimes
 from airtruth.importers.guessing.columns import Column
@@ -20,6 +20,7 @@ from airtruth.importers.guessing.sides import other_side
 from airtruth.importers.guessing.slots import ALL_SLOTS, LATERAL_SLOTS, SLOT_OF
 from airtruth.importers.guessing.times import Times, entry
 from airtruth.physics.atmosphere import density_kg_m3
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.reconstruction import NEEDED
 
 Array = NDArray[np.float64]
@@ -29,10 +30,10 @@ _DENSITY: Final = 0.03
 temperature, 15 K)."""
 _WITNESSES: Final = ("ground_speed", "gps_altitude")
 """Slots that are evidence and no channels."""
-_ORDER: Final = (
-    "airspeed", "alpha", "theta", "q", "ax", "az", "elevator", "elevator_command", "throttle", "altitude", "density",
-)  # fmt: skip
+_ORDER: Final = tuple(SIGNALS[name].stem for name in PITCH_PLANE)
 """Slots in the order of a log's columns."""
+_SIDES: Final = ("elevator", "rudder")
+"""Slots of surfaces whose two sides move together."""
 _FEW: Final = 3
 """Columns that a comment lists [-] (judgement)."""
 
@@ -172,7 +173,7 @@ class Writer:
 
     def _lines(self, decision: Decision) -> Iterator[str]:
         r = decision.reading
-        other = other_side(r, decision.others) if r.slot in ("elevator", "rudder") else None
+        other = other_side(r, decision.others) if r.slot in _SIDES else None
         if r.kind == "pair":
             yield entry(*r.columns, weights=r.weights)
         else:
@@ -236,16 +237,16 @@ class Writer:
     def _missing(self) -> Iterator[str]:
         """Channels that a log needs and the guess does not have."""
         doubted = {d.reading.channel for d in self.decisions.values()}
-        for name in REQUIRED:
+        for name in LONGITUDINAL.required:
             if name in self.mapped:
                 continue
-            if name == "alpha_rad" and name not in doubted and set(NEEDED) <= self.mapped:
+            if name == LONGITUDINAL.vane and name not in doubted and set(NEEDED) <= self.mapped:
                 for column, why in self.found.synthetic:
                     yield f"\n# {column.full!r} is {why}"
                 yield "\n[reconstruct] # no vane: alpha follows from q, az and airspeed\nalpha = true"
                 continue
-            if name == "elevator_rad" and name not in doubted:
-                yield from self._surface()
+            if name in LONGITUDINAL.surfaces and name not in doubted:
+                yield from self._surface(name)
                 continue
             if name in doubted or (name == "airspeed_m_s" and self._doubted("airspeed")):
                 continue
@@ -268,24 +269,24 @@ class Writer:
     def _doubted(self, slot: str) -> bool:
         return slot in self.decisions and ALL_SLOTS[slot][0] not in self.mapped
 
-    def _surface(self) -> Iterator[str]:
+    def _surface(self, name: str) -> Iterator[str]:
         """Columns that follow the elevator without being an angle."""
         ranked = sorted(self._effects(), key=lambda one: -abs(one[2]))[:_FEW]
         if not ranked:
             self.doubts.append(
-                "elevator_rad was not found; state its column and unit, or import a file that holds it"
+                f"{name} was not found; state its column and unit, or import a file that holds it"
             )
-            yield f"\n# [channels.elevator_rad] # needed, not found: {SIGNALS['elevator_rad'].description}"
+            yield f"\n# [channels.{name}] # needed, not found: {SIGNALS[name].description}"
             yield '# column = "..."\n# unit = "..."'
             return
         column, why, _ = ranked[0]
         if why == MIXED:
-            yield from self._mixed()
+            yield from self._mixed(name)
             return
         self.doubts.append(
-            f"elevator_rad: {column.full!r} is {why}; measure the deflection at two of its values and state them as calibration"
+            f"{name}: {column.full!r} is {why}; measure the deflection at two of its values and state them as calibration"
         )
-        yield f"\n# [channels.elevator_rad] # needed: {column.full!r} is {why}"
+        yield f"\n# [channels.{name}] # needed: {column.full!r} is {why}"
         yield from (f"# {line}" for line in entry(column).splitlines())
         finite = column.values[np.isfinite(column.values)]
         low, high = float(finite.min()), float(finite.max())
@@ -294,15 +295,15 @@ class Writer:
         for other, _, effect in ranked:
             yield f"# {other.full!r}: t = {effect:+.1f} of its effect on q'"
 
-    def _mixed(self) -> Iterator[str]:
+    def _mixed(self, name: str) -> Iterator[str]:
         """Surfaces that are elevator and aileron together."""
         mixed = [column for column, why in self.found.surfaces if why == MIXED]
         names = ", ".join(json.dumps(c.key) for c in mixed)
         self.doubts.append(
-            f"elevator_rad: {names} are {MIXED.replace('one of ', '')}; state columns, and weights or a calibration of each, "
+            f"{name}: {names} are {MIXED.replace('one of ', '')}; state columns, and weights or a calibration of each, "
             "with trailing edge down positive"
         )
-        yield f"\n# [channels.elevator_rad] # needed: {names} are {MIXED.replace('one of ', '')}"
+        yield f"\n# [channels.{name}] # needed: {names} are {MIXED.replace('one of ', '')}"
         yield f"# columns = [{names}]\n# weights = [0.5, 0.5] # of angles trailing edge down; -0.5 of a mirrored servo"
         yield '# calibration = [[..., ...], [..., ...]] # value, deflection [deg], where they are no angles\n# unit = "deg"'
 

@@ -9,42 +9,42 @@ from numpy.typing import NDArray
 
 from airtruth.channels import LATERAL, SIGNALS
 from airtruth.checks.means import LIMITS, MEANS
+from airtruth.physics.motion import LATERAL as MOTION
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
 
-SLOTS: Final[dict[str, tuple[str, ...]]] = {
-    "az": ("az_m_s2",),
-    "q": ("q_rad_s",),
-    "theta": ("theta_rad",),
+_CHANNEL: Final = {one.stem: name for name, one in SIGNALS.items()}
+"""Slot -> channel of the log that fills it."""
+_INSTEAD: Final[dict[str, tuple[str, ...]]] = {
     "airspeed": (
-        "airspeed_m_s",
         "calibrated_airspeed_m_s",
         "equivalent_airspeed_m_s",
         "indicated_airspeed_m_s",
         "dynamic_pressure_pa",
     ),
-    "alpha": ("alpha_rad",),
-    "ax": ("ax_m_s2",),
-    "elevator": ("elevator_rad",),
+    "altitude": ("static_pressure_pa", "height_m"),
     "ground_speed": ("ground_speed_m_s",),
     "gps_altitude": ("gps_altitude_m",),
-    "altitude": ("altitude_m", "static_pressure_pa", "height_m"),
-    "density": ("density_kg_m3",),
-    "elevator_command": ("elevator_command_rad",),
-    "throttle": ("throttle",),
 }
+"""Slot -> other quantities that may fill it, the best first."""
+
+
+def _deflections(motion: Motion) -> tuple[str, ...]:
+    """Slots of the control surfaces of a motion and of their commands."""
+    return tuple(SIGNALS[name].stem for name in (*motion.surfaces, *motion.commands))
+
+
+SLOTS: Final[dict[str, tuple[str, ...]]] = {
+    slot: (*(name for name in (_CHANNEL.get(slot),) if name), *_INSTEAD.get(slot, ()))
+    for slot in (
+        "az", "q", "theta", "airspeed", "alpha", "ax", "elevator", "ground_speed", "gps_altitude", "altitude", "density",
+        "elevator_command", "throttle",
+    )
+}  # fmt: skip
 """Slot of an assignment -> what may fill it, the best first."""
 LATERAL_SLOTS: Final[dict[str, tuple[str, ...]]] = {
-    "p": ("p_rad_s",),
-    "phi": ("phi_rad",),
-    "r": ("r_rad_s",),
-    "psi": ("psi_rad",),
-    "ay": ("ay_m_s2",),
-    "beta": ("beta_rad",),
-    "aileron": ("aileron_rad",),
-    "rudder": ("rudder_rad",),
-    "aileron_command": ("aileron_command_rad",),
-    "rudder_command": ("rudder_command_rad",),
+    slot: (_CHANNEL[slot],) for slot in ("p", "phi", "r", "psi", "ay", "beta", *_deflections(MOTION))
 }
 """The same of the lateral-directional motion, which is assigned after the other one and never changes it."""
 ALL_SLOTS: Final = {**SLOTS, **LATERAL_SLOTS}
@@ -53,10 +53,11 @@ SLOT_OF: Final = {name: slot for slot, names in ALL_SLOTS.items() for name in na
 """Channel -> its slot."""
 SIZE: Final = {
     "airspeed": (40.0, 0.9), "alpha": (0.08, 0.9), "theta": (0.12, 1.1), "q": (0.2, 1.3), "az": (9.81, 0.15), "ax": (1.5, 1.1),
-    "elevator": (0.1, 1.1), "elevator_command": (0.1, 1.1), "altitude": (800.0, 1.6), "density": (1.1, 0.25),
+    "altitude": (800.0, 1.6), "density": (1.1, 0.25),
     "throttle": (0.5, 0.8), "ground_speed": (40.0, 0.9), "gps_altitude": (800.0, 1.6),
     "p": (0.3, 1.3), "phi": (0.3, 1.2), "r": (0.12, 1.3), "psi": (1.5, 1.2), "ay": (0.8, 1.2), "beta": (0.05, 1.0),
-    "aileron": (0.1, 1.1), "rudder": (0.08, 1.1), "aileron_command": (0.1, 1.1), "rudder_command": (0.08, 1.1),
+    **dict.fromkeys((*_deflections(LONGITUDINAL), *_deflections(MOTION)), (0.1, 1.1)),
+    "rudder": (0.08, 1.1), "rudder_command": (0.08, 1.1),
 }  # fmt: skip
 """Slot -> median and standard deviation of the logarithm of a usual size [SI] (judgement: from a 1 kg model to an airliner)."""
 CENTRED: Final = frozenset({"airspeed", "az", "altitude", "density", "ground_speed", "gps_altitude"})
@@ -65,18 +66,14 @@ SIGN: Final = {
     "az": 0.5,
     "ax": 0.04,
     "ay": 0.04,
-    **dict.fromkeys(("elevator", "elevator_command"), 0.3),
-    **dict.fromkeys(("aileron", "aileron_command", "rudder", "rudder_command"), 0.5),
+    **dict.fromkeys(_deflections(LONGITUDINAL), 0.3),
+    **dict.fromkeys(_deflections(MOTION), 0.5),
 }
 """Slot -> probability of the sign opposite to the contract's (judgement)."""
 OPPOSITE: Final = 0.02
 """The same of other angles and rates."""
-SIGNED: Final = frozenset({"az", "ax", "q", "theta", "alpha", "elevator", "elevator_command", *LATERAL_SLOTS})
+SIGNED: Final = frozenset({"az", "ax", "q", "theta", "alpha", *_deflections(LONGITUDINAL), *LATERAL_SLOTS})
 """Slots that have a sign."""
-TURNING: Final = ("theta_rad", "phi_rad", "psi_rad")
-"""Angles that jump by a turn."""
-
-
 OUTSIDE: Final = 20.0
 """Loss of a reading that leaves the range of flight (judgement)."""
 

@@ -18,6 +18,7 @@ from airtruth.logs.digest import sha256_of
 from airtruth.logs.flight_log import PRESCRIBED, FlightLog
 from airtruth.logs.names import chunk_file
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation import instruments as measure
 from airtruth.simulation.campaign import streams
 from airtruth.simulation.campaign.air import air_of
@@ -25,9 +26,9 @@ from airtruth.simulation.campaign.effects import EFFECTS
 from airtruth.simulation.campaign.inputs import commands
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
-from airtruth.simulation.lateral_feedback import LateralFeedback
+from airtruth.simulation.lateral_feedback import FED, LateralFeedback
 from airtruth.simulation.linearise import Linearisation, lateral_truth, linearise
-from airtruth.simulation.manoeuvres import ELEVATOR, LATERAL_CONTROLS, sample
+from airtruth.simulation.manoeuvres import LATERAL_CONTROLS, sample
 from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
 
@@ -227,8 +228,8 @@ class Pilot:
                 theta_error_rad=self._error("theta_rad", run),
             )
         if plan.campaign.lateral:
-            aileron, rudder = (command.get(name, still) for name in LATERAL_CONTROLS)
-            turning = LateralInputs(aileron, rudder, air.v_m_s, air.p_rad_s, air.r_rad_s, self._feedback(run))
+            lateral = {name: command.get(name, still) for name in LATERAL_CONTROLS}
+            turning = LateralInputs(lateral, air.v_m_s, air.p_rad_s, air.r_rad_s, self._feedback(run))
             inputs = replace(inputs, lateral=turning)
         return prepared.flight.fly(inputs)
 
@@ -237,10 +238,9 @@ class Pilot:
         gains = self.plan.campaign.augmentation
         if not gains.lateral:
             return None
+        p, r, phi = (self._error(name, run) for name in FED)
         return LateralFeedback(
-            p_error_rad_s=self._error("p_rad_s", run),
-            r_error_rad_s=self._error("r_rad_s", run),
-            phi_error_rad=self._error("phi_rad", run),
+            errors=(p, r, phi),
             yaw_damper_gain_s=gains.yaw_damper_gain_s,
             roll_damper_gain_s=gains.roll_damper_gain_s,
             bank_gain=gains.bank_gain,

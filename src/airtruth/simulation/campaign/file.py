@@ -13,10 +13,10 @@ from airtruth.aircraft import Sensor, sensor_tables
 from airtruth.documents import read_toml
 from airtruth.errors import ConfigurationError
 from airtruth.physics.gust_figures import FIGURES, LEVELS
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.campaign.effect_table import EffectTable
 from airtruth.simulation.campaign.manoeuvre_table import ManoeuvreTable
 from airtruth.simulation.campaign.tables import Constant, Draw, UnitTable, one_of
-from airtruth.simulation.manoeuvres import ELEVATOR
 
 NO_GUST: Final = "none"
 """Gust level of calm air."""

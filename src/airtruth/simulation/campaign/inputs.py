@@ -15,9 +15,10 @@ from airtruth.aircraft import Aircraft, JsbsimModel
 from airtruth.errors import ConfigurationError
 from airtruth.logs.store import read_log
 from airtruth.physics import actuators
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.campaign.manoeuvre_table import InputTable
-from airtruth.simulation.manoeuvres import CONTROLS, ELEVATOR, LATERAL_CONTROLS, Manoeuvre
+from airtruth.simulation.manoeuvres import CONTROLS, LATERAL_CONTROLS, Manoeuvre
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG
 
@@ -151,7 +152,7 @@ def _of_actuator(aircraft: Aircraft, control: str, at: Trim, deviation: Array, d
     servo = getattr(aircraft.file, f"{control}_actuator", None)
     if servo is None:
         return
-    trim_rad = getattr(at, f"{control}_rad")
+    trim_rad = at.surfaces_rad[control]
     command = trim_rad + deviation
     which = "" if control == ELEVATOR else f"{control} "
     low, high = servo.minimum.value, servo.maximum.value

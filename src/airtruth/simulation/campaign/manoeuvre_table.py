@@ -7,8 +7,9 @@ from typing import Any, ClassVar, Final, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.campaign.tables import Constant, Draw, UnitTable, one_of
-from airtruth.simulation.manoeuvres import CONTROLS, ELEVATOR, KINDS, MOST_HARMONICS
+from airtruth.simulation.manoeuvres import CONTROLS, KINDS, MOST_HARMONICS
 
 MOST_INPUTS: Final = 8
 """Control inputs of a run [-] (judgement: three controls, two or three inputs each)."""

@@ -13,16 +13,19 @@ import numpy as np
 from airtruth.channels import SIGNALS
 from airtruth.errors import LogError, choices, counted
 from airtruth.logs.names import chunk_file
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
 from airtruth.result import shortened
 from airtruth.simulation.campaign.chunk import FAILED, INTERRUPTED, OK, Outcome
 from airtruth.simulation.campaign.plan import Plan
-from airtruth.simulation.manoeuvres import ELEVATOR
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-PLOTTED: Final = {"elevator_rad": "elevator", "alpha_rad": "alpha", "q_rad_s": "q", "az_m_s2": "az"}
+PLOTTED: Final = {c.channel: c.name for c in LONGITUDINAL.controls} | {
+    y.channel: y.name for y in LONGITUDINAL.outputs
+}
 """Channels, with their labels, that `CampaignResult.plot` shows: the input of the short period and its measured outputs."""
 PLOTTED_LATERAL: Final = {
     "aileron_rad": "aileron",

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
 from airtruth.aircraft.probe import Constants, constants_of
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.simulator import Condition, Controls, Executive
 from airtruth.units import DEG, G0
 
@@ -79,11 +81,14 @@ class ModelBench:
         alpha = self.alpha_rad if alpha_rad is None else alpha_rad
         rates = dict(lateral or {})
         controls = Controls(
-            command, lever, bank_rad=rates.pop("phi_rad", 0.0), sideslip_rad=rates.pop("beta_rad", 0.0)
+            lever,
+            {ELEVATOR: command},
+            bank_rad=rates.pop("phi_rad", 0.0),
+            sideslip_rad=rates.pop(LATERAL.vane, 0.0),
         )
         if lateral is not None:
             condition = replace(condition, straight="wings-level")
-        executive.initialise(condition, alpha, controls, q_rad_s, **rates)
+        executive.initialise(condition, alpha, controls, rates | {LONGITUDINAL.gyros[0]: q_rad_s})
         return executive
 
 

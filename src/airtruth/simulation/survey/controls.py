@@ -11,6 +11,7 @@ import numpy as np
 
 from airtruth.aircraft.model import LateralProperties, SurfaceProperties
 from airtruth.errors import AircraftError
+from airtruth.physics.motion import LATERAL
 from airtruth.simulation.survey.bench import ModelBench, read
 from airtruth.simulation.survey.names import ModelNames
 from airtruth.units import DEG
@@ -84,17 +85,6 @@ class Found:
     surface: SurfaceProperties
     notes: tuple[str, ...]
     decisions: tuple[str, ...]
-
-
-def elevator_of(bench: ModelBench, names: ModelNames) -> Found:
-    """Find the command that pitches the aircraft and the surface that moves with it.
-
-    Raises
-    ------
-    AircraftError
-        If no command pitches the aircraft, or no property of a surface moves with it.
-    """
-    return control_of(bench, names, ELEVATOR)
 
 
 def control_of(bench: ModelBench, names: ModelNames, control: SurveyedControl) -> Found:
@@ -249,11 +239,7 @@ def lateral_of(bench: ModelBench) -> tuple[LateralProperties | None, list[str]]:
     off = max(abs(r.v_dot_m_s2), abs(r.p_dot_rad_s2), abs(r.r_dot_rad_s2))
     if off <= _STRAIGHT:
         return None, []
-    commands = {
-        name: surface.command
-        for name, surface in (("aileron", bench.model.aileron), ("rudder", bench.model.rudder))
-        if surface is not None
-    }
+    commands = {name: surface.command for name, surface in bench.model.surfaces(LATERAL).items()}
     found = LateralProperties(**commands)
     effects = [
         np.array(
@@ -262,7 +248,7 @@ def lateral_of(bench: ModelBench) -> tuple[LateralProperties | None, list[str]]:
                 for key in ("p_dot_rad_s2", "r_dot_rad_s2")
             ]
         )
-        for name in (found.aileron, found.rudder)
+        for _, name in found
     ]
     if min(float(np.abs(e).max()) for e in effects) < _TURNS:
         return None, [f"asymmetric by {off:.2g} (SI) at zero sideslip, and aileron or rudder have no effect"]
@@ -275,7 +261,6 @@ __all__ = [
     "Found",
     "SurveyedControl",
     "control_of",
-    "elevator_of",
     "feedback_rad",
     "integrated",
     "lateral_of",

@@ -11,6 +11,7 @@ import numpy as np
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import FlightError, TrimError
+from airtruth.physics.expected import EXPECTED
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
@@ -31,8 +32,8 @@ _TIME_S: Final = 90.0
 _ALPHA_RAD: Final = 4.0 * DEG
 """Angle of attack of the condition that is proposed for a first flight, if there is a choice [rad] (judgement: away
 from the stall and from zero lift)."""
-_CMALPHA: Final = LONGITUDINAL.parameters.index("Cmalpha")
-"""Index of Cmalpha among the derivatives."""
+STIFFNESS: Final = EXPECTED[LONGITUDINAL.name].stiffness
+"""Derivative by which an aircraft is stable or not."""
 _SLACK_DEG: Final = 4.0
 """Amplitude of the doublet where slack holds the surface [deg] (judgement: twice the slack of a light aircraft's cables)."""
 _FOLLOWS: Final = 0.5
@@ -148,7 +149,7 @@ def first_condition(aircraft: Aircraft, points: list[Point]) -> Trim | None:
         trims.sort(key=lambda t: abs(t.alpha_rad - _ALPHA_RAD))
         slopes: list[float] = []
         for at in trims:
-            slopes.append(float(linearise(aircraft, at).central[_CMALPHA]))
+            slopes.append(float(linearise(aircraft, at).central[LONGITUDINAL.index(STIFFNESS)]))
             if slopes[-1] < 0.0:
                 return at
         if trims:

@@ -7,6 +7,8 @@ from typing import Final
 
 from airtruth.aircraft.model import SurfaceProperties
 from airtruth.errors import AircraftError
+from airtruth.physics.motion import LATERAL
+from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
 from airtruth.simulation.survey.bench import ModelBench
 from airtruth.simulation.survey.controls import (
     FEEDBACK_RAD,
@@ -40,7 +42,7 @@ RUDDER: Final = SurveyedControl(
     "YAW",
 )
 """The rudder, positive with the trailing edge left."""
-_MOTION: Final = {"p_rad_s": 5.0 * DEG, "r_rad_s": 5.0 * DEG, "beta_rad": 1.0 * DEG, "phi_rad": 5.0 * DEG}
+_MOTION: Final = {**dict.fromkeys(LATERAL.gyros, 5.0 * DEG), LATERAL.vane: 1.0 * DEG, "phi_rad": 5.0 * DEG}
 """Motions under which a surface has to stand still [rad/s], [rad] (judgement: those of a small manoeuvre)."""
 
 
@@ -58,7 +60,7 @@ def with_lateral_controls(bench: ModelBench, names: ModelNames) -> tuple[ModelBe
             found = control_of(bench, names, control)
         except AircraftError as error:
             notes.append(f"lateral flights are not possible: {error}")
-            return bench.known(aileron=None, rudder=None), notes, decisions
+            return bench.known(**dict.fromkeys(LATERAL_CONTROLS)), notes, decisions
         notes += found.notes
         decisions += found.decisions
         bench = bench.known(**{control.name: found.surface})
@@ -67,9 +69,8 @@ def with_lateral_controls(bench: ModelBench, names: ModelNames) -> tuple[ModelBe
 
 
 def _controls(bench: ModelBench) -> list[tuple[SurveyedControl, SurfaceProperties]]:
-    model = bench.model
-    pairs = ((AILERON, model.aileron), (RUDDER, model.rudder))
-    return [(control, surface) for control, surface in pairs if surface is not None]
+    surfaces = bench.model.surfaces(LATERAL)
+    return [(control, surfaces[control.name]) for control in (AILERON, RUDDER) if control.name in surfaces]
 
 
 def feedback_rad(bench: ModelBench) -> dict[str, float]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -12,7 +13,7 @@ from airtruth.errors import FlightError, TrimError
 from airtruth.physics.motion import LATERAL
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.linearise import linearise
-from airtruth.simulation.manoeuvres import Manoeuvre, sample
+from airtruth.simulation.manoeuvres import LATERAL_CONTROLS, Manoeuvre, sample
 from airtruth.simulation.simulator import Straight, jsbsim_model
 from airtruth.simulation.survey.bench import STEP_S
 from airtruth.simulation.trim import Trim, trim
@@ -43,7 +44,7 @@ class LateralTest:
     Attributes
     ----------
     straight : how it is trimmed; "" without a trim.
-    beta_deg, phi_deg, aileron_deg, rudder_deg : of the trim [deg].
+    beta_deg, phi_deg : of the trim [deg]; surfaces_deg : control -> its surface [deg].
     derivatives, modes : by the names of ``LATERAL``.
     amplitude_deg : of the doublets of aileron and rudder [deg].
     step_s, duration_s : of the doublets and of the record [s].
@@ -54,8 +55,7 @@ class LateralTest:
     straight: str = ""
     beta_deg: float = 0.0
     phi_deg: float = 0.0
-    aileron_deg: float = 0.0
-    rudder_deg: float = 0.0
+    surfaces_deg: Mapping[str, float] = field(default_factory=dict)
     derivatives: dict[str, float] | None = None
     modes: dict[str, float] | None = None
     amplitude_deg: tuple[float, ...] = ()
@@ -87,8 +87,7 @@ def flown_laterally(aircraft: Aircraft, at: Trim) -> LateralTest:
         straight=found.condition.straight,
         beta_deg=c.sideslip_rad / DEG,
         phi_deg=c.bank_rad / DEG,
-        aileron_deg=found.aileron_rad / DEG,
-        rudder_deg=found.rudder_rad / DEG,
+        surfaces_deg={name: found.surfaces_rad[name] / DEG for name in LATERAL_CONTROLS},
         derivatives=dict(zip(LATERAL.parameters, linear.central.tolist(), strict=True)),
         modes=dict(linear.modes),
     )
@@ -116,34 +115,32 @@ def _trimmed(aircraft: Aircraft, at: Trim) -> tuple[Trim | None, str]:
     return None, fault
 
 
-def _bounded(aircraft: Aircraft, amplitude_deg: float) -> tuple[float, float]:
+def _bounded(aircraft: Aircraft, amplitude_deg: float) -> tuple[float, ...]:
     """Amplitudes of aileron and rudder within the travel of the stick [deg]."""
-    model = jsbsim_model(aircraft)
-    assert model.aileron is not None
-    assert model.rudder is not None
-    limits = (_STICK / abs(s.command_per_rad) / DEG for s in (model.aileron, model.rudder))
-    aileron, rudder = (float(f"{min(amplitude_deg, limit):.2g}") for limit in limits)
-    return aileron, rudder
+    surfaces = jsbsim_model(aircraft).surfaces(LATERAL).values()
+    limits = (_STICK / abs(surface.command_per_rad) / DEG for surface in surfaces)
+    return tuple(float(f"{min(amplitude_deg, limit):.2g}") for limit in limits)
 
 
 def _ranges(aircraft: Aircraft, at: Trim, test: LateralTest) -> tuple[tuple[float, ...], str]:
     """Ranges of sideslip and bank in a record with both doublets [deg], and what leaves its range."""
     t = np.arange(round(test.duration_s / STEP_S) + 1, dtype=np.float64) * STEP_S
     still = np.zeros_like(t)
-    aileron, rudder = (
+    doublets = [
         sample(Manoeuvre("doublet", a * DEG, start_s=start, step_s=test.step_s), t)
         for a, start in zip(test.amplitude_deg, (_START_S, 0.5 * test.duration_s), strict=True)
-    )
+    ]
+    lateral = LateralInputs(dict(zip(LATERAL_CONTROLS, doublets, strict=True)))
     flight = Flight(aircraft, at, STEP_S, 4)
-    flown = flight.fly(Inputs(still, still, still, lateral=LateralInputs(aileron, rudder)))
+    flown = flight.fly(Inputs(still, still, still, lateral=lateral))
     for name, most in _MOST.items():
         away = float(np.abs(flown[name] - flown[name][0]).max())
         if away > most:
             return (), f"{name.removesuffix('_rad')} moves by {away / DEG:.0f} deg in {test.duration_s:g} s"
-    for control, amplitude_deg in zip(("aileron", "rudder"), test.amplitude_deg, strict=True):
-        moved_deg = float(np.ptp(flown[f"{control}_rad"])) / DEG
+    for control, amplitude_deg in zip(LATERAL.controls, test.amplitude_deg, strict=True):
+        moved_deg = float(np.ptp(flown[control.channel])) / DEG
         if moved_deg < _FOLLOWS * 2.0 * amplitude_deg:
-            return (), f"a doublet of {amplitude_deg:g} deg moves the {control} by {moved_deg:.2g} deg"
+            return (), f"a doublet of {amplitude_deg:g} deg moves the {control.name} by {moved_deg:.2g} deg"
     return tuple(float(np.ptp(flown[name])) / DEG for name in ("beta_rad", "phi_rad")), ""
 
 

@@ -15,6 +15,7 @@ from airtruth.aircraft.model import ElevatorProperties, ThrottleProperties
 from airtruth.aircraft.probe import model_file, wheel_root
 from airtruth.errors import AircraftError, AirtruthError
 from airtruth.isolation.protocol import Reply
+from airtruth.physics.motion import LATERAL
 from airtruth.simulation.survey import bench as benches
 from airtruth.simulation.survey import controls, engines, envelope
 from airtruth.simulation.survey.bench import ModelBench
@@ -70,7 +71,7 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
     powered = engines.engines_of(bench, names)
     notes += powered.notes
     decisions += powered.decisions
-    found = controls.elevator_of(powered.bench, names)
+    found = controls.control_of(powered.bench, names, controls.ELEVATOR)
     notes += found.notes
     decisions += found.decisions
     bench = powered.bench.known(elevator=ElevatorProperties(**found.surface.model_dump()))
@@ -111,7 +112,7 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
         c = at.condition
         facts["condition"] = {"eas_m_s": c.eas_m_s, "altitude_m": c.altitude_m, "gamma_rad": c.gamma_rad}
         facts["flight"] = asdict(envelope.flown(bench.aircraft, at))
-        if bench.model.aileron is not None:
+        if bench.model.surfaces(LATERAL):
             facts["lateral_flight"] = asdict(flown_laterally(bench.aircraft, at))
     return facts
 

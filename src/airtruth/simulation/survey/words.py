@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from airtruth.simulation.survey.envelope import EnvelopeRow, FlightTest
+from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
+from airtruth.simulation.survey.envelope import STIFFNESS, EnvelopeRow, FlightTest
 from airtruth.simulation.survey.lateral_flight import LateralTest
 from airtruth.units import DEG, FT, KT
 
@@ -51,9 +52,9 @@ def flight(facts: Mapping[str, Any]) -> tuple[str, ...]:
             f"{test.duration_s:g} s with fixed controls: alpha moves {still:.2g} deg; with a doublet of "
             f"{test.amplitude_deg:g} deg {moved:.2g} deg"
         )
-    if test.derivatives["Cmalpha"] > 0.0:
+    if test.derivatives[STIFFNESS] > 0.0:
         lines.append(
-            "the aircraft is unstable at every airspeed that was trimmed at this altitude (Cmalpha above 0)"
+            f"the aircraft is unstable at every airspeed that was trimmed at this altitude ({STIFFNESS} above 0)"
         )
     if test.fault:
         lines.append(f"another record fails: {test.fault}")
@@ -110,8 +111,7 @@ def lateral(facts: Mapping[str, Any]) -> tuple[str, ...]:
     trimmed = (
         ("sideslip", test.beta_deg),
         ("bank", test.phi_deg),
-        ("aileron", test.aileron_deg),
-        ("rudder", test.rudder_deg),
+        *test.surfaces_deg.items(),
     )
     where = "wings level" if test.straight == "wings-level" else "no sideslip"
     lines = [
@@ -120,13 +120,14 @@ def lateral(facts: Mapping[str, Any]) -> tuple[str, ...]:
         ", ".join(f"{name} {value:.3g}" for name, value in test.modes.items()),
     ]
     if test.range_deg:
-        (aileron, rudder), (beta, phi) = test.amplitude_deg, test.range_deg
+        beta, phi = test.range_deg
+        sizes = zip(test.amplitude_deg, LATERAL_CONTROLS, strict=True)
+        doublets = " and ".join(f"{size_deg:g} deg {name}" for size_deg, name in sizes)
         lines.append(
-            f"{test.duration_s:g} s with doublets of {aileron:g} deg aileron and {rudder:g} deg rudder: sideslip moves "
-            f"{beta:.2g} deg, bank {phi:.2g} deg"
+            f"{test.duration_s:g} s with doublets of {doublets}: sideslip moves {beta:.2g} deg, bank {phi:.2g} deg"
         )
     else:
-        lines.append(f"no record with doublets of aileron and rudder: {test.fault}")
+        lines.append(f"no record with doublets of {' and '.join(LATERAL_CONTROLS)}: {test.fault}")
     return tuple(lines)
 
 
@@ -136,25 +137,21 @@ def lateral_campaign(name: str, facts: Mapping[str, Any]) -> str:
     test = None if found is None else LateralTest(**found)
     if test is None or not test.range_deg:
         return ""
-    aileron, rudder = test.amplitude_deg
-    half, step = 0.5 * test.duration_s, test.step_s
+    starts = ("1.0", f"{0.5 * test.duration_s:g}")
+    inputs = [
+        *zip(("manoeuvre", "manoeuvre.also"), LATERAL_CONTROLS, test.amplitude_deg, starts, strict=True)
+    ]
     signs = "".join(
         f"""
-[[manoeuvre]]
-control = "aileron"
+[[{table}]]
+control = "{control}"
 kind = "doublet"
-amplitude_deg = {sign * aileron:g}
-start_s = 1.0
-step_s = {step:g}
-
-[[manoeuvre.also]]
-control = "rudder"
-kind = "doublet"
-amplitude_deg = {sign * rudder:g}
-start_s = {half:g}
-step_s = {step:g}
+amplitude_deg = {sign * size_deg:g}
+start_s = {start}
+step_s = {test.step_s:g}
 """
         for sign in (1.0, -1.0)
+        for table, control, size_deg, start in inputs
     )
     return f"""# Six records in six axes in light turbulence at the first condition of {REPORT}; every key: docs/campaigns.md
 schema = 1

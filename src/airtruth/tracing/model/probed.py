@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.operating_point import lateral_operating_point, operating_point
 from airtruth.simulation.probe import ForceGrid, forces_at_speeds
@@ -90,7 +91,7 @@ def probed(
         return np.arange(first, last + 1.0) * DEG
 
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _MARGIN, _LEAST_RATE[None])
-    offset = at.controls.elevator_command_rad - at.elevator_rad
+    offset = at.controls.command(ELEVATOR) - at.elevator_rad
     commands = whole(elevator[0] + offset, elevator[1] + offset)
     grid = ForceGrid(whole(*alpha), commands, rates, np.ones(1))
     point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, SPEEDS)
@@ -149,7 +150,7 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
         for number, own in enumerate(tables.values)
     ]
     own_axes = [x * f for x, f in zip(tables.signals, factors, strict=True)]
-    surfaces = [getattr(at, control.channel) for control in LATERAL.controls]
+    surfaces = [at.surfaces_rad[control.name] for control in LATERAL.controls]
     origin = [at.controls.sideslip_rad, 0.0, 0.0, *surfaces]
     return Plant(
         aircraft=aircraft,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.motion_parts import Control
 from airtruth.tracing.model.damper import damper_surface, find_damper
-from airtruth.tracing.model.records import FINE, Signals, fine
+from airtruth.tracing.model.records import FINE, OF_OTHER_MOTION, Signals, fine
 from airtruth.tracing.model.surface_path import LONGEST_STEP_S, Between, read_between
 from airtruth.units import G0
 
@@ -113,6 +113,7 @@ def read(
             _surface(channels, control, dt, sub * FINE, own)
             for control, own in zip(motion.controls, declared, strict=True)
         ]
+        known: dict[str, Any] = {n: _known(channels, n, motion, dt, sub) for n in OF_OTHER_MOTION}
         found.append(
             Signals(
                 run_id=run_id,
@@ -127,10 +128,7 @@ def read(
                 altitude_m=float(np.mean(altitude)),
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
                 motion=motion,
-                alpha_rad=_known(channels, "alpha_rad", motion, dt, sub),
-                q_rad_s=_known(channels, "q_rad_s", motion, dt, sub),
-                ax_m_s2=_known(channels, "ax_m_s2", motion, dt, sub),
-                az_m_s2=_known(channels, "az_m_s2", motion, dt, sub),
+                **known,
                 control_std_rad=np.array([s.noise_std_rad for s in surfaces]),
                 corner_rad2=_together([s.between.corner_rad2 for s in surfaces], len(t)),
                 surface_noise_rad2=_together([s.noise_rad2 for s in surfaces], len(t)),

@@ -21,16 +21,15 @@ _HEAD_S: Final = 0.1
 _HEAD_SAMPLES: Final = 3
 """Least number of samples of that start [-] (judgement)."""
 
+OF_OTHER_MOTION: Final = ("alpha_rad", "q_rad_s", "ax_m_s2", "az_m_s2")
+"""Channels of the pitch plane that are known inputs of the other motion."""
 _SERIES: Final = (
     "controls_rad",
     "airspeed_m_s",
     "ground_m_s",
     "density_kg_m3",
     "theta_rad",
-    "alpha_rad",
-    "q_rad_s",
-    "ax_m_s2",
-    "az_m_s2",
+    *OF_OTHER_MOTION,
     "corner_rad2",
     "surface_noise_rad2",
 )

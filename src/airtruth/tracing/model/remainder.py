@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.physics.readings import state_of
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.replay import each_flown_through
 from airtruth.simulation.tracks import Track, substeps
@@ -55,7 +56,7 @@ def remainders(signals: Sequence[Signals], plants: Sequence[Plant]) -> list[Arra
         aircraft = part[0][2].aircraft
         tracks = [(at, track_of(s)) for _, s, _, at in part]
         flown = isolated_flight(
-            sum(track.elevator_rad.size for _, track in tracks),
+            sum(track.airspeed_m_s.size for _, track in tracks),
             f"the flight of {aircraft.name}",
             each_flown_through,
             aircraft,
@@ -74,19 +75,19 @@ def _beyond_tables(signals: Signals, plant: Plant, at: Trim, flown: Mapping[str,
     pressure = 0.5 * flown["density_kg_m3"] * speed**2
     half = 0.5 * c.chord_m / speed
     change = declared_dynamics(plant.aircraft.file.dynamics)
-    surface = through(change.surface, flown["elevator_rad"], dt_s)
+    alpha, q, az, surface = (flown[name] for name in plant.motion.channels)
     (names,) = LAYOUTS[plant.motion.name]
-    motion = dict(zip(names, (flown["alpha_rad"], surface, flown["q_rad_s"] * half), strict=True))
-    _, fz, moment = looked_up(_reaching(plant, at, motion, flown["q_rad_s"]), motion, pressure).T
+    motion = dict(zip(names, (alpha, through(change.surface, surface, dt_s), q * half), strict=True))
+    _, fz, moment = looked_up(_reaching(plant, at, motion, q), motion, pressure).T
     force = pressure * c.wing_area_m2
     found = np.stack(
         [
-            (fz - flown["az_m_s2"] * at.mass_kg) / force,
+            (fz - az * at.mass_kg) / force,
             (c.inertia_yy_kg_m2 * flown["q_dot_rad_s2"] - moment) / (force * c.chord_m),
         ]
     )
     if change.aero:
-        turn = np.gradient(flown["alpha_rad"], dt_s) * half
+        turn = np.gradient(alpha, dt_s) * half
         known = motion | {plant.motion.flow_rate: turn, "qbar": pressure}
         signals_ = {name: x[None] for name, x in known.items()}
         signals_ |= {s.name: state_of(s, signals_[s.signal], dt_s) for s in change.states}
@@ -123,7 +124,7 @@ def track_of(signals: Signals) -> Track:
         substeps=steps,
         outputs={},
         weight={},
-        elevator_rad=on_grid(signals.elevator_rad, signals.sub * FINE),
+        controls_rad={ELEVATOR: on_grid(signals.elevator_rad, signals.sub * FINE)},
         airspeed_m_s=on_grid(signals.airspeed_m_s, signals.sub),
     )
 
