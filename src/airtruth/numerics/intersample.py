@@ -111,11 +111,15 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
 
 def _ratios(increments: Array) -> tuple[Array, Array]:
     """Ratios of neighbouring increments (runs, ratios), least first, and their weights; NaN and zero where none counts."""
-    weights = np.abs(increments[:, :-1])
-    used = weights > _MOVING * np.abs(increments).max(axis=1, keepdims=True)
-    weights = np.where(used, weights, 0.0)
-    ratios = np.divide(increments[:, 1:], increments[:, :-1], out=np.full_like(weights, np.nan), where=used)
-    order = np.argsort(ratios, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
+    size = np.abs(increments)
+    run, cell = np.nonzero(size[:, :-1] > _MOVING * size.max(axis=1, keepdims=True))
+    counts = np.bincount(run, minlength=len(size))
+    place = np.arange(run.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    weights = np.zeros((len(size), max(1, int(counts.max(initial=0)))))
+    ratios = np.full_like(weights, np.nan)
+    weights[run, place] = size[run, cell]
+    ratios[run, place] = increments[run, cell + 1] / increments[run, cell]
+    order = np.argsort(ratios, axis=1, kind="stable")
     return np.take_along_axis(ratios, order, axis=1), np.take_along_axis(weights, order, axis=1)
 
 

@@ -19,6 +19,8 @@ from airtruth.numerics.compiled import inner
 Array = NDArray[np.float64]
 
 
+LANES: Final = 16
+"""Rows that are filtered side by side: four vectors, because each recursion waits for its own last result."""
 LEFT: Final = 0.04
 """Part of the slowest mode of the filter that remains at the end of an extension [-] (judgement: 0.3 s at 5 Hz)."""
 
@@ -76,30 +78,27 @@ def edge_samples(sos: Array) -> int:
 
 
 @inner
-def _section(rows: Array, sos: Array, first: int, step: int) -> None:
-    """Run one section along four rows in place, from sample ``first`` in direction ``step``.
+def _section(rows: Array, sos: Array, first: int, step: int, last: Array, before: Array) -> None:
+    """Run one section along rows in place, from sample ``first`` in direction ``step``.
 
     Direct form II; the state starts where a constant equal to the first sample would have left it.
-    Four independent recursions run side by side, because each waits for its own last result.
+
+    Parameters
+    ----------
+    rows : (samples, `LANES`): a sample of all rows is contiguous, so that they are filtered side by side.
+    last, before : (`LANES`,) room for the states.
     """
-    samples = rows.shape[1]
     b0, b1, b2, a1, a2 = sos[0], sos[1], sos[2], sos[4], sos[5]
     gain = 1.0 / (1.0 + a1 + a2)
-    s1 = s2 = rows[0, first] * gain
-    t1 = t2 = rows[1, first] * gain
-    u1 = u2 = rows[2, first] * gain
-    v1 = v2 = rows[3, first] * gain
+    for lane in range(LANES):
+        last[lane] = before[lane] = rows[first, lane] * gain
     k = first
-    for _ in range(samples):
-        s = (rows[0, k] - a2 * s2) - a1 * s1
-        t = (rows[1, k] - a2 * t2) - a1 * t1
-        u = (rows[2, k] - a2 * u2) - a1 * u1
-        v = (rows[3, k] - a2 * v2) - a1 * v1
-        rows[0, k] = b0 * s + (b1 * s1 + b2 * s2)
-        rows[1, k] = b0 * t + (b1 * t1 + b2 * t2)
-        rows[2, k] = b0 * u + (b1 * u1 + b2 * u2)
-        rows[3, k] = b0 * v + (b1 * v1 + b2 * v2)
-        s2, s1, t2, t1, u2, u1, v2, v1 = s1, s, t1, t, u1, u, v1, v
+    for _ in range(rows.shape[0]):
+        for lane in range(LANES):
+            s = (rows[k, lane] - a2 * before[lane]) - a1 * last[lane]
+            rows[k, lane] = b0 * s + (b1 * last[lane] + b2 * before[lane])
+            before[lane] = last[lane]
+            last[lane] = s
         k += step
 
 
@@ -107,23 +106,25 @@ def _section(rows: Array, sos: Array, first: int, step: int) -> None:
 def _zero_phase(x: Array, sos: Array, edge: int, work: Array, out: Array) -> None:
     rows, samples = x.shape
     padded = samples + 2 * edge
-    for start in range(0, rows, 4):
-        for lane in range(min(4, rows - start)):
+    last, before = np.empty(LANES), np.empty(LANES)
+    for start in range(0, rows, LANES):
+        lanes = min(LANES, rows - start)
+        for lane in range(lanes):
             row = x[start + lane]
             for i in range(edge):
-                work[lane, i] = 2.0 * row[0] - row[edge - i]
-                work[lane, edge + samples + i] = 2.0 * row[samples - 1] - row[samples - 2 - i]
+                work[i, lane] = 2.0 * row[0] - row[edge - i]
+                work[edge + samples + i, lane] = 2.0 * row[samples - 1] - row[samples - 2 - i]
             for i in range(samples):
-                work[lane, edge + i] = row[i]
+                work[edge + i, lane] = row[i]
         for way in range(
             2
         ):  # variables: numba compiles a function again for each constant that it is called with
             first, step = (padded - 1) * way, 1 - 2 * way
             for s in range(sos.shape[0]):
-                _section(work, sos[s], first, step)
-        for lane in range(min(4, rows - start)):
+                _section(work, sos[s], first, step, last, before)
+        for lane in range(lanes):
             for i in range(samples):
-                out[start + lane, i] = work[lane, edge + i]
+                out[start + lane, i] = work[edge + i, lane]
 
 
 def zero_phase(x: Array, sos: Array) -> Array:
@@ -142,5 +143,5 @@ def zero_phase(x: Array, sos: Array) -> Array:
     rows = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
     out = np.empty_like(rows)
     edge = edge_samples(sos)
-    _zero_phase(rows, sos, edge, np.zeros((4, rows.shape[1] + 2 * edge)), out)
+    _zero_phase(rows, sos, edge, np.zeros((rows.shape[1] + 2 * edge, LANES)), out)
     return out.reshape(x.shape)
