@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
 from airtruth.numerics.discretise import eliminate, step
+from airtruth.numerics.prefilter import LANES
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -66,7 +67,29 @@ def remove(basis: Array, rows: Array) -> None:
                     rows[run, i, k] -= part * basis[run, j, k]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@partial(inner, fastmath={"contract"})
+def _states(phi: Array, early: Array, late: Array, u: Array, bend: Array, scale: Array, out: Array) -> None:
+    """The first three of four states from rest, each with its factor, into out (3 or more, samples); inputs as in `respond`."""
+    first, second, bend0, bend1 = u[0], u[1], bend[0], bend[1]
+    s0, s1, s2 = scale[0], scale[1], scale[2]
+    x0 = x1 = x2 = x3 = 0.0
+    out[0, 0] = out[1, 0] = out[2, 0] = 0.0
+    for k in range(1, u.shape[1]):
+        a, b = first[k - 1] + bend0[k], first[k] + bend0[k]
+        c, d = second[k - 1] + bend1[k], second[k] + bend1[k]
+        e0 = (early[0, 0] * a + late[0, 0] * b) + (early[0, 1] * c + late[0, 1] * d)
+        e1 = (early[1, 0] * a + late[1, 0] * b) + (early[1, 1] * c + late[1, 1] * d)
+        e2 = (early[2, 0] * a + late[2, 0] * b) + (early[2, 1] * c + late[2, 1] * d)
+        e3 = (early[3, 0] * a + late[3, 0] * b) + (early[3, 1] * c + late[3, 1] * d)
+        y0 = (e0 + phi[0, 0] * x0 + phi[0, 1] * x1) + (phi[0, 2] * x2 + phi[0, 3] * x3)
+        y1 = (e1 + phi[1, 0] * x0 + phi[1, 1] * x1) + (phi[1, 2] * x2 + phi[1, 3] * x3)
+        y2 = (e2 + phi[2, 0] * x0 + phi[2, 1] * x1) + (phi[2, 2] * x2 + phi[2, 3] * x3)
+        x3 = (e3 + phi[3, 0] * x0 + phi[3, 1] * x1) + (phi[3, 2] * x2 + phi[3, 3] * x3)
+        x0, x1, x2 = y0, y1, y2
+        out[0, k], out[1, k], out[2, k] = s0 * x0, s1 * x1, s2 * x2
+
+
+@njit(cache=True, error_model="numpy")
 def respond(systems: Array, dt_s: float, u: Array, bend: Array, runs: Ints, scale: Array, out: Array) -> None:
     """Response from rest of models of four states and two inputs: the first three states, each with its factor.
 
@@ -76,96 +99,165 @@ def respond(systems: Array, dt_s: float, u: Array, bend: Array, runs: Ints, scal
     dt_s : sample period [s].
     u, bend : (all, 2, samples) input, linear between samples, and its additional mean over the cell that ends at each sample.
     runs : (active,) numbers of the runs among all.
-    scale : (active, 3) factors.
+    scale : (all, 3 or more) factors.
     out : (active, 3 or more, samples), its first rows written.
     """
     phi, noise, process = np.empty((4, 4)), np.empty((4, 4)), np.zeros(4)
     early, late = np.empty((4, 2)), np.empty((4, 2))
     for i in range(systems.shape[0]):
         step(systems[i], process, 4, dt_s, phi, early, late, noise)
-        first, second, bend0, bend1 = u[runs[i], 0], u[runs[i], 1], bend[runs[i], 0], bend[runs[i], 1]
-        s0, s1, s2 = scale[i, 0], scale[i, 1], scale[i, 2]
-        x0 = x1 = x2 = x3 = 0.0
-        out[i, 0, 0] = out[i, 1, 0] = out[i, 2, 0] = 0.0
-        for k in range(1, u.shape[2]):
-            a, b = first[k - 1] + bend0[k], first[k] + bend0[k]
-            c, d = second[k - 1] + bend1[k], second[k] + bend1[k]
-            e0 = (early[0, 0] * a + late[0, 0] * b) + (early[0, 1] * c + late[0, 1] * d)
-            e1 = (early[1, 0] * a + late[1, 0] * b) + (early[1, 1] * c + late[1, 1] * d)
-            e2 = (early[2, 0] * a + late[2, 0] * b) + (early[2, 1] * c + late[2, 1] * d)
-            e3 = (early[3, 0] * a + late[3, 0] * b) + (early[3, 1] * c + late[3, 1] * d)
-            y0 = (e0 + phi[0, 0] * x0 + phi[0, 1] * x1) + (phi[0, 2] * x2 + phi[0, 3] * x3)
-            y1 = (e1 + phi[1, 0] * x0 + phi[1, 1] * x1) + (phi[1, 2] * x2 + phi[1, 3] * x3)
-            y2 = (e2 + phi[2, 0] * x0 + phi[2, 1] * x1) + (phi[2, 2] * x2 + phi[2, 3] * x3)
-            x3 = (e3 + phi[3, 0] * x0 + phi[3, 1] * x1) + (phi[3, 2] * x2 + phi[3, 3] * x3)
-            x0, x1, x2 = y0, y1, y2
-            out[i, 0, k], out[i, 1, k], out[i, 2, k] = s0 * x0, s1 * x1, s2 * x2
+        _states(phi, early, late, u[runs[i]], bend[runs[i]], scale[runs[i]], out[i])
+
+
+@partial(inner, fastmath={"reassoc", "contract", "nsz"})
+def _product(a: Array, b: Array) -> float:
+    total = 0.0
+    for k in range(a.size):
+        total += a[k] * b[k]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def response_sums(
+    systems: Array,
+    dt_s: float,
+    u: Array,
+    bend: Array,
+    runs: Ints,
+    scale: Array,
+    x: Array,
+    y: Array,
+    sums: Array,
+) -> None:
+    """Sums of products of the states of `respond` with rows of the runs, without materialising the states.
+
+    Parameters
+    ----------
+    x, y : (all, signals, inside) and (all, coefficients, inside), without as many samples at the start as at the end.
+    sums : (active, 3 or more, signals + coefficients), its first rows written.
+    """
+    phi, noise, process = np.empty((4, 4)), np.empty((4, 4)), np.zeros(4)
+    early, late = np.empty((4, 2)), np.empty((4, 2))
+    states, inside = np.empty((3, u.shape[2])), x.shape[2]
+    first = (u.shape[2] - inside) // 2
+    for i in range(systems.shape[0]):
+        run = runs[i]
+        step(systems[i], process, 4, dt_s, phi, early, late, noise)
+        _states(phi, early, late, u[run], bend[run], scale[run], states)
+        for a in range(3):
+            own = states[a, first : first + inside]
+            for b in range(x.shape[1]):
+                sums[i, a, b] = _product(own, x[run, b])
+            for b in range(y.shape[1]):
+                sums[i, a, x.shape[1] + b] = _product(own, y[run, b])
 
 
 @partial(inner, fastmath={"contract"})
-def _cubic_pair(x: Array, y: Array, more: Array, phi: Array, early: Array, late: Array, out: Array) -> None:
-    """The first state of 1/Delta(p), from rest, for x and y, into out (2, samples).
+def _cubic_lanes(x: Array, corners: Array, cornered: int, phi: Array, hold: Array, out: Array) -> None:
+    """The first state of 1/Delta(p), from rest, for each lane of x (samples, `LANES`), into out (`LANES`, samples).
 
-    The input of a cell is linear, plus the constant that gives it the area of the cubic through four samples, plus ``more``
-    (2, samples). Two recursions run side by side because each waits for its own last result.
+    The input of a cell is linear, plus the constant that gives it the area of the cubic through four samples, plus corners (2,
+    samples) in two lanes. The lanes run side by side because each waits for its own last result.
+
+    Parameters
+    ----------
+    hold : (10 `LANES`,) states, gains of the states by the early and by the late end of a cell, room for a row: in one array,
+        because the compiler cannot tell that several do not overlap.
     """
-    g0, g1, g2 = early[0, 0], early[1, 0], early[2, 0]
-    h0, h1, h2 = late[0, 0], late[1, 0], late[2, 0]
-    x0 = x1 = x2 = y0 = y1 = y2 = 0.0
-    out[0, 0] = out[1, 0] = 0.0
-    last = x.size - 1
-    for k in range(1, x.size):
+    p00, p01, p02, p10, p11 = phi[0, 0], phi[0, 1], phi[0, 2], phi[1, 0], phi[1, 1]
+    p12, p20, p21, p22 = phi[1, 2], phi[2, 0], phi[2, 1], phi[2, 2]
+    for lane in range(LANES):
+        hold[lane] = hold[LANES + lane] = hold[2 * LANES + lane] = out[lane, 0] = 0.0
+    last = x.shape[0] - 1
+    for k in range(1, x.shape[0]):
         before, after = max(k - 2, 0), min(k + 1, last)
-        area = (x[k - 1] + x[k] - x[before] - x[after]) * (1.0 / 24.0) + more[0, k]
-        a, b = x[k - 1] + area, x[k] + area
-        area = (y[k - 1] + y[k] - y[before] - y[after]) * (1.0 / 24.0) + more[1, k]
-        c, d = y[k - 1] + area, y[k] + area
-        t0 = (g0 * a + h0 * b) + phi[0, 0] * x0 + (phi[0, 1] * x1 + phi[0, 2] * x2)
-        t1 = (g1 * a + h1 * b) + phi[1, 0] * x0 + (phi[1, 1] * x1 + phi[1, 2] * x2)
-        x2 = (g2 * a + h2 * b) + phi[2, 0] * x0 + (phi[2, 1] * x1 + phi[2, 2] * x2)
-        x0, x1 = t0, t1
-        t0 = (g0 * c + h0 * d) + phi[0, 0] * y0 + (phi[0, 1] * y1 + phi[0, 2] * y2)
-        t1 = (g1 * c + h1 * d) + phi[1, 0] * y0 + (phi[1, 1] * y1 + phi[1, 2] * y2)
-        y2 = (g2 * c + h2 * d) + phi[2, 0] * y0 + (phi[2, 1] * y1 + phi[2, 2] * y2)
-        y0, y1 = t0, t1
-        out[0, k], out[1, k] = x0, y0
+        for lane in range(LANES):
+            area = x[k - 1, lane] + x[k, lane] - x[before, lane] - x[after, lane]
+            hold[9 * LANES + lane] = area * (1.0 / 24.0)
+        for row in range(2):
+            if 0 <= cornered + row < LANES:
+                hold[9 * LANES + cornered + row] += corners[row, k]
+        for lane in range(LANES):
+            area = hold[9 * LANES + lane]
+            a, b = x[k - 1, lane] + area, x[k, lane] + area
+            x0, x1, x2 = hold[lane], hold[LANES + lane], hold[2 * LANES + lane]
+            t0 = hold[3 * LANES + lane] * a + hold[6 * LANES + lane] * b
+            t1 = hold[4 * LANES + lane] * a + hold[7 * LANES + lane] * b
+            t2 = hold[5 * LANES + lane] * a + hold[8 * LANES + lane] * b
+            hold[lane] = t0 + p00 * x0 + (p01 * x1 + p02 * x2)
+            hold[LANES + lane] = t1 + p10 * x0 + (p11 * x1 + p12 * x2)
+            hold[2 * LANES + lane] = t2 + p20 * x0 + (p21 * x1 + p22 * x2)
+        for lane in range(LANES):
+            out[lane, k] = hold[lane]
 
 
 @njit(cache=True, error_model="numpy")
 def filter_rows(
-    cubics: Array, dt_s: float, rows: Array, bend: Array, runs: Ints, own: Array, out: Array
+    systems: Array,
+    dt_s: float,
+    u: Array,
+    bend: Array,
+    corners: Array,
+    runs: Ints,
+    scale: Array,
+    rows: Array,
+    instruments: int,
+    out: Array,
+    sums: Array,
 ) -> None:
-    """Filter rows of runs from rest by 1/Delta(p), Delta a cubic; the first rows are filtered by p/Delta(p).
+    """Filter rows and instruments of runs from rest by 1/Delta(p), Delta = |p I - A| of the first three states.
 
     Signals are linear between samples plus the area of the cubic through the four nearest.
 
     Parameters
     ----------
-    cubics : (active, 3) c0, c1, c2 of Delta(p) = p^3 + c2 p^2 + c1 p + c0.
-    dt_s : sample period [s].
-    rows : (all, rows, samples), an even number, the first two for p/Delta, the last two with corners.
-    bend : (all, 2, samples) additional mean of the last rows over the cell that ends at each sample.
-    runs : (active,) numbers of the runs among all.
-    own : (active, instruments, samples) further rows of the active runs, an even number.
-    out : (active, rows + instruments, samples), written.
+    systems, dt_s, u, bend, runs, scale : as in `respond`, whose states are the instruments.
+    corners : (all, 2, samples) additional mean of the rows before the instruments over the cell that ends at each sample.
+    rows : (all, blocks, samples, `LANES`); the first two rows are filtered by p/Delta instead.
+    instruments : number of the first of three rows in which there is room for the instruments.
+    out : (active, blocks, `LANES`, samples), written; the first two rows are also added to those three further on. One entry
+        serves all runs in turn where the sums alone are wanted.
+    sums : (active, chosen, blocks, `LANES`), written: products of as many rows, the last two before the instruments first, with
+        all.
     """
-    count, samples = rows.shape[1], rows.shape[2]
-    system, process = np.zeros((3, 5)), np.zeros(3)
-    phi, noise, still = np.empty((3, 3)), np.empty((3, 3)), np.zeros((2, samples))
-    early, late = np.empty((3, 2)), np.empty((3, 2))
-    for i in range(cubics.shape[0]):
+    phi, noise, process = np.empty((4, 4)), np.empty((4, 4)), np.zeros(4)
+    early, late = np.empty((4, 2)), np.empty((4, 2))
+    system, slow = np.zeros((3, 5)), np.empty((3, 3))
+    first, second, spread = np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 3))
+    hold, states = np.empty(10 * LANES), np.empty((3, rows.shape[2]))
+    for i in range(systems.shape[0]):
+        run, a, made = runs[i], systems[i], out[i % out.shape[0]]
+        step(a, process, 4, dt_s, phi, early, late, noise)
+        _states(phi, early, late, u[run], bend[run], scale[run], states)
+        for j in range(3):
+            block, lane = divmod(instruments + j, LANES)
+            for k in range(states.shape[1]):
+                rows[run, block, k, lane] = states[j, k]
+        trace = a[0, 0] + a[1, 1] + a[2, 2]
+        minors = (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]) + (a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0])
+        minor = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
+        determinant = a[0, 0] * minor - a[0, 1] * (a[1, 0] * a[2, 2] - a[1, 2] * a[2, 0])
+        determinant += a[0, 2] * (a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0])
         system[0, 1] = system[1, 2] = system[2, 3] = 1.0
-        system[2, 0], system[2, 1], system[2, 2] = -cubics[i, 0], -cubics[i, 1], -cubics[i, 2]
-        system[1, 4], system[2, 4] = 1.0, -cubics[i, 2]  # p/Delta in the first state: A times the other input
-        step(system, process, 3, dt_s, phi, early, late, noise)
-        given, made = rows[runs[i]], own[i]
-        _cubic_pair(given[0], given[1], still, phi, early[:, 1:], late[:, 1:], out[i, :2])
-        for row in range(2, count, 2):
-            more = still if row + 2 < count else bend[runs[i]]
-            _cubic_pair(given[row], given[row + 1], more, phi, early, late, out[i, row : row + 2])
-        for row in range(0, made.shape[0], 2):
-            to = out[i, count + row : count + row + 2]
-            _cubic_pair(made[row], made[row + 1], still, phi, early, late, to)
+        system[2, 0], system[2, 1], system[2, 2] = determinant, -(minors + minor), trace
+        system[1, 4], system[2, 4] = 1.0, trace  # p/Delta in the first state: A times the other input
+        step(system, process, 3, dt_s, slow, first, second, spread)
+        for block in range(rows.shape[1]):
+            for lane in range(LANES):
+                which = 1 if block == 0 and lane < 2 else 0
+                for j in range(3):
+                    hold[(3 + j) * LANES + lane] = first[j, which]
+                    hold[(6 + j) * LANES + lane] = second[j, which]
+            cornered = instruments - 2 - block * LANES
+            _cubic_lanes(rows[run, block], corners[run], cornered, slow, hold, made[block])
+        for j in range(2):
+            for k in range(states.shape[1]):
+                made[0, 3 + j, k] += made[0, j, k]
+        for row in range(sums.shape[1]):
+            block, lane = divmod(instruments - 2 + row, LANES)
+            for other in range(rows.shape[1]):
+                for j in range(LANES):
+                    sums[i, row, other, j] = _product(made[block, lane], made[other, j])
 
 
 @njit(cache=True, error_model="numpy")
@@ -201,4 +293,4 @@ def solve(matrix: Array, right: Array, limit: float, theta: Array) -> None:
                 theta[run, i, j] = both[i, n + j] if sound and math.isfinite(both[i, n + j]) else np.nan
 
 
-__all__ = ["filter_rows", "left_sides", "remove", "respond", "solve"]
+__all__ = ["LANES", "filter_rows", "left_sides", "remove", "respond", "response_sums", "solve"]

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.lateral.kernels import filter_rows, remove, respond
+from airtruth.identification.lateral.kernels import LANES, filter_rows, remove, respond, response_sums
 from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
@@ -41,9 +41,6 @@ _INSIDE: Final = slice(2, -2)
 _INDEPENDENT: Final = 1e-12
 """Square of a free column outside those before it, over its own, from which it counts as another [-]; judgement, four digits
 above rounding."""
-_FAST: Final = 3
-"""Order of the dynamic filter: the states beta, p and r."""
-
 
 @dataclass(frozen=True)
 class Rows:
@@ -173,28 +170,26 @@ def lowpass_problem(o: LateralObservation, options: Options, smooth: SmoothRows)
     rows, u = smooth
     bend = smooth_bend(u)
     model = LinearModels.of(o)
+    states, signals = len(_STATES), rows.x.shape[1]
+    fixed = np.empty((len(u), signals, signals + rows.y.shape[1]))
+    for part, columns in ((rows.x, slice(signals)), (rows.y, slice(signals, None))):
+        fixed[:, states:, columns] = np.matmul(u[..., _INSIDE], np.swapaxes(part, 1, 2))
 
     def at(theta: Array, active: Ints) -> Rows:
         own = picked(rows, active)
-        return Rows(
-            np.ascontiguousarray(model.instruments(theta, active, u, bend)[..., _INSIDE]),
-            own.x,
-            own.y,
-            own.free,
-        )
+        z = np.ascontiguousarray(model.instruments(theta, active, u, bend)[..., _INSIDE])
+        remove(own.free, z)
+        return Rows(z, own.x, own.y, own.free)
 
-    def orthogonal(theta: Array, active: Ints) -> Rows:
-        made = at(theta, active)
-        remove(made.free, made.z)
-        return made
-
-    return LateralProblem(
-        orthogonal,
+    def moments(theta: Array, active: Ints) -> Array:
         # regressors and left sides are orthogonal to the constants, so that the instruments need not be
-        lambda theta, active: moments_of(at(theta, active)),
-        model.bounded,
-        rows.x.shape[0],
-    )
+        sums: Array = fixed[active]
+        response_sums(
+            model.systems(theta, active), o.dt_s, u, bend, active, model.rates, rows.x, rows.y, sums
+        )
+        return sums
+
+    return LateralProblem(at, moments, model.bounded, rows.x.shape[0])
 
 
 def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
@@ -204,45 +199,47 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
     linear between samples plus the area of the cubic through the four nearest; surfaces have the corners of their servo.
     The low-passed rows have no effect.
     """
-    count, controls, coefficients = len(LATERAL.signals), len(CONTROLS), len(LATERAL.coefficients)
-    constants = o.nuisance()
-    even = np.zeros((len(constants), constants.shape[1] % 2, constants.shape[2]))
-    rates = o.slopes[:, _MOMENTS]
-    given = np.concatenate([rates, o.added, constants, even, o.regressors], axis=1)
+    rates, constants = o.slopes[:, _MOMENTS], o.nuisance()
+    runs, count, samples = constants.shape
+    instruments = rates.shape[1] + o.added.shape[1] + o.regressors.shape[1]
+    last = instruments + len(_STATES) + count
+    blocks = -(-last // LANES)
+    room = np.zeros((runs, len(_STATES), samples))
+    unused = np.zeros((runs, blocks * LANES - last, samples))
+    given = np.concatenate([rates, o.added, o.regressors, room, constants, unused], axis=1)
+    rows = np.ascontiguousarray(np.swapaxes(given.reshape(runs, blocks, LANES, samples), 2, 3))
     u = np.ascontiguousarray(o.controls)
     bend = smooth_bend(u) + o.bend
     model = LinearModels.of(o)
-    y = slice(rates.shape[1], rates.shape[1] + coefficients)
-    free = slice(y.stop, y.stop + constants.shape[1])
-    x = slice(given.shape[1] - count, given.shape[1])
-    z = np.array([*range(x.stop, x.stop + len(_STATES)), *range(x.stop - controls, x.stop)])
+    y = slice(rates.shape[1], rates.shape[1] + o.added.shape[1])
+    x, free = slice(y.stop, instruments), slice(last - count, last)
+    # sums are those of the surfaces, the states and the constants
+    first = instruments - len(CONTROLS)
+    z = np.array([*range(instruments, free.start), *range(first, instruments)])
 
-    def filtered(theta: Array, active: Ints) -> Array:
-        own = model.instruments(theta, active, u, bend)[:, : len(_STATES) + 1]
-        out = np.empty((active.size, given.shape[1] + own.shape[1], given.shape[2]))
-        filter_rows(model.cubics(theta, active), o.dt_s, given, o.bend, active, own, out)
-        out[:, y][:, _MOMENTS] += out[:, : y.start]
-        return out
+    def filtered(theta: Array, active: Ints, kept: int) -> tuple[Array, Array]:
+        out = np.empty((kept, blocks, LANES, samples))
+        sums = np.empty((active.size, last - first, blocks, LANES))
+        systems = model.systems(theta, active)
+        filter_rows(systems, o.dt_s, u, bend, o.bend, active, model.rates, rows, instruments, out, sums)
+        return out.reshape(kept, -1, samples), sums.reshape(*sums.shape[:2], -1)
 
     def at(theta: Array, active: Ints) -> Rows:
-        out = filtered(theta, active)
-        return free_of(np.take(out, z, axis=1), out[:, x].copy(), out[:, y].copy(), out[:, free])
+        out, _ = filtered(theta, active, active.size)
+        return free_of(out[:, z], out[:, x].copy(), out[:, y].copy(), out[:, free])
 
     def moments(theta: Array, active: Ints) -> Array:
-        out = filtered(theta, active)[:, y.start : x.stop + len(_STATES)]
-        sums = np.matmul(out, np.swapaxes(out, 1, 2))
-        least = _INDEPENDENT * np.einsum("rii->ri", sums)
-        first = free.start - y.start
-        for column in range(
-            first, first + constants.shape[1]
-        ):  # the constants are swept out one after another
-            pivot = sums[:, column, column]
-            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > least[:, column])
-            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, column]
-        own, shift = np.take(sums, z - y.start, axis=1), y.start
-        return np.concatenate([own[:, :, x.start - shift : x.stop - shift], own[:, :, :coefficients]], axis=2)
+        _, sums = filtered(theta, active, 1)
+        squares = [sums[:, column - first, column] for column in range(free.start, free.stop)]
+        least = _INDEPENDENT * np.array(squares)
+        for number, column in enumerate(range(free.start, free.stop)):  # swept out one after another
+            pivot = sums[:, column - first, column]
+            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > least[number])
+            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, column - first]
+        own = sums[:, z - first]
+        return np.concatenate([own[:, :, x], own[:, :, y]], axis=2)
 
-    return LateralProblem(at, moments, model.bounded, given.shape[0])
+    return LateralProblem(at, moments, model.bounded, runs)
 
 
 def smooth_bend(u: Array) -> Array:
@@ -292,17 +289,9 @@ class LinearModels:
         (active, signals, samples).
         """
         z = np.empty((active.size, len(LATERAL.signals), self.samples))
-        factors = np.ascontiguousarray(self.rates[active, : len(_STATES)])
-        respond(self.systems(theta, active), self.dt_s, u, bend, active, factors, z)
+        respond(self.systems(theta, active), self.dt_s, u, bend, active, self.rates, z)
         z[:, len(_STATES) :] = u[active]
         return z
-
-    def cubics(self, theta: Array, active: Ints) -> Array:
-        """c0, c1, c2 of |p I - A| = p^3 + c2 p^2 + c1 p + c0 of beta, p and r, (active, 3)."""
-        a = self.systems(theta, active)[:, :_FAST, :_FAST]
-        trace = np.trace(a, axis1=1, axis2=2)
-        second = 0.5 * (trace**2 - np.einsum("rij,rji->r", a, a))
-        return np.stack([-np.linalg.det(a), second, -trace], axis=1)
 
     def bounded(self, theta: Array, active: Ints) -> Bools:
         """(active,) whether the motion grows by less than `GROWTH` over the record, by the fastest root."""
