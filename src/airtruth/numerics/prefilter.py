@@ -127,7 +127,7 @@ def _zero_phase(x: Array, sos: Array, edge: int, work: Array, out: Array) -> Non
                 out[start + lane, i] = work[edge + i, lane]
 
 
-def zero_phase(x: Array, sos: Array) -> Array:
+def zero_phase(x: Array, sos: Array, *, in_place: bool = False) -> Array:
     """Filter forward and backward along the last axis: twice the attenuation, no lag.
 
     Each end is extended by `edge_samples` samples of the record mirrored through its end point (odd
@@ -139,9 +139,10 @@ def zero_phase(x: Array, sos: Array) -> Array:
     ----------
     x : (..., samples), more samples than `edge_samples`.
     sos : (sections, 6) from `butterworth`.
+    in_place : write into x, which is contiguous.
     """
     rows = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
-    out = np.empty_like(rows)
+    out = rows if in_place else np.empty_like(rows)
     edge = edge_samples(sos)
     _zero_phase(rows, sos, edge, np.zeros((rows.shape[1] + 2 * edge, LANES)), out)
     return out.reshape(x.shape)

@@ -10,11 +10,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
-from airtruth.numerics.discretise import eliminate, step
+from airtruth.numerics.discretise import eliminate, multiply, step
 from airtruth.numerics.prefilter import LANES
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 Seven = tuple[float, float, float, float, float, float, float]
 
 
@@ -67,6 +68,81 @@ def remove(basis: Array, rows: Array) -> None:
                     rows[run, i, k] -= part * basis[run, j, k]
 
 
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+def orthonormal(columns: Array, least: float, basis: Array) -> None:
+    """Orthonormal rows (runs, columns, samples) of the space of ``columns``, by the modified Gram-Schmidt process, done twice.
+
+    A column is zero whose square outside those before it is at most ``least`` of its own.
+    """
+    runs, count, samples = columns.shape
+    for run in range(runs):
+        for i in range(count):
+            before = 0.0
+            for k in range(samples):
+                basis[run, i, k] = columns[run, i, k]
+                before += columns[run, i, k] ** 2
+            for _ in range(2):
+                for j in range(i):
+                    part = 0.0
+                    for k in range(samples):
+                        part += basis[run, i, k] * basis[run, j, k]
+                    for k in range(samples):
+                        basis[run, i, k] -= part * basis[run, j, k]
+            after = 0.0
+            for k in range(samples):
+                after += basis[run, i, k] ** 2
+            size = 1.0 / math.sqrt(after) if after > least * before else 0.0
+            for k in range(samples):
+                basis[run, i, k] *= size
+
+
+@partial(inner, fastmath={"reassoc", "contract", "nsz"})
+def _product(a: Array, b: Array) -> float:
+    total = 0.0
+    for k in range(a.size):
+        total += a[k] * b[k]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def products(z: Array, x: Array, y: Array, sums: Array) -> None:
+    """Sums (runs, rows of z, rows of x and y) of products of rows (runs, rows, samples)."""
+    for run in range(z.shape[0]):
+        for a in range(z.shape[1]):
+            for b in range(x.shape[1]):
+                sums[run, a, b] = _product(z[run, a], x[run, b])
+            for b in range(y.shape[1]):
+                sums[run, a, x.shape[1] + b] = _product(z[run, a], y[run, b])
+
+
+@njit(cache=True, error_model="numpy")
+def grow_less(a: Array, rate: float, less: Bools) -> None:
+    """Whether every root of the motions x' = a x of four states, (runs, 4, 4), has a real part below a rate [1/s], into (runs,).
+
+    The criterion of Routh and Hurwitz for a - rate I, whose characteristic polynomial follows from the traces of its powers:
+    eigenvalues take many times as long. A matrix that is not finite has no such roots.
+    """
+    one, two = np.empty((4, 4)), np.empty((4, 4))
+    for run in range(a.shape[0]):
+        for i in range(4):
+            for j in range(4):
+                one[i, j] = a[run, i, j] - (rate if i == j else 0.0)
+        multiply(one, one, two)
+        t1 = t2 = t3 = t4 = 0.0
+        for i in range(4):
+            t1 += one[i, i]
+            t2 += two[i, i]
+            for j in range(4):
+                t3 += two[i, j] * one[j, i]
+                t4 += two[i, j] * two[j, i]
+        c3 = -t1
+        c2 = -0.5 * (c3 * t1 + t2)
+        c1 = -(c2 * t1 + c3 * t2 + t3) / 3.0
+        c0 = -0.25 * (c1 * t1 + c2 * t2 + c3 * t3 + t4)
+        first = c3 * c2 - c1
+        less[run] = c3 > 0.0 and c0 > 0.0 and first > 0.0 and first * c1 > c3**2 * c0
+
+
 @partial(inner, fastmath={"contract"})
 def _states(phi: Array, early: Array, late: Array, u: Array, bend: Array, scale: Array, out: Array) -> None:
     """The first three of four states from rest, each with its factor, into out (3 or more, samples); inputs as in `respond`."""
@@ -107,14 +183,6 @@ def respond(systems: Array, dt_s: float, u: Array, bend: Array, runs: Ints, scal
     for i in range(systems.shape[0]):
         step(systems[i], process, 4, dt_s, phi, early, late, noise)
         _states(phi, early, late, u[runs[i]], bend[runs[i]], scale[runs[i]], out[i])
-
-
-@partial(inner, fastmath={"reassoc", "contract", "nsz"})
-def _product(a: Array, b: Array) -> float:
-    total = 0.0
-    for k in range(a.size):
-        total += a[k] * b[k]
-    return total
 
 
 @njit(cache=True, error_model="numpy")
@@ -201,7 +269,7 @@ def filter_rows(
     runs: Ints,
     scale: Array,
     rows: Array,
-    instruments: int,
+    chosen: Ints,
     out: Array,
     sums: Array,
 ) -> None:
@@ -212,27 +280,28 @@ def filter_rows(
     Parameters
     ----------
     systems, dt_s, u, bend, runs, scale : as in `respond`, whose states are the instruments.
-    corners : (all, 2, samples) additional mean of the rows before the instruments over the cell that ends at each sample.
-    rows : (all, blocks, samples, `LANES`); the first two rows are filtered by p/Delta instead.
-    instruments : number of the first of three rows in which there is room for the instruments.
+    corners : (all, 2, samples) additional mean of the last two rows over the cell that ends at each sample.
+    rows : (all, rows, samples); the first two are filtered by p/Delta instead. The instruments follow the rows.
+    chosen : numbers of rows and instruments, for the sums.
     out : (active, blocks, `LANES`, samples), written; the first two rows are also added to those three further on. One entry
         serves all runs in turn where the sums alone are wanted.
-    sums : (active, chosen, blocks, `LANES`), written: products of as many rows, the last two before the instruments first, with
-        all.
+    sums : (active, chosen, rows - 2), written: products of the chosen rows with the third and further ones.
     """
     phi, noise, process = np.empty((4, 4)), np.empty((4, 4)), np.zeros(4)
     early, late = np.empty((4, 2)), np.empty((4, 2))
     system, slow = np.zeros((3, 5)), np.empty((3, 3))
     first, second, spread = np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 3))
     hold, states = np.empty(10 * LANES), np.empty((3, rows.shape[2]))
+    instruments, lanes = rows.shape[1], np.zeros((out.shape[1], rows.shape[2], LANES))
     for i in range(systems.shape[0]):
         run, a, made = runs[i], systems[i], out[i % out.shape[0]]
         step(a, process, 4, dt_s, phi, early, late, noise)
         _states(phi, early, late, u[run], bend[run], scale[run], states)
-        for j in range(3):
-            block, lane = divmod(instruments + j, LANES)
-            for k in range(states.shape[1]):
-                rows[run, block, k, lane] = states[j, k]
+        for j in range(instruments + 3):
+            block, lane = divmod(j, LANES)
+            row = rows[run, j] if j < instruments else states[j - instruments]
+            for k in range(row.size):
+                lanes[block, k, lane] = row[k]
         trace = a[0, 0] + a[1, 1] + a[2, 2]
         minors = (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]) + (a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0])
         minor = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
@@ -242,22 +311,21 @@ def filter_rows(
         system[2, 0], system[2, 1], system[2, 2] = determinant, -(minors + minor), trace
         system[1, 4], system[2, 4] = 1.0, trace  # p/Delta in the first state: A times the other input
         step(system, process, 3, dt_s, slow, first, second, spread)
-        for block in range(rows.shape[1]):
+        for block in range(lanes.shape[0]):
             for lane in range(LANES):
                 which = 1 if block == 0 and lane < 2 else 0
                 for j in range(3):
                     hold[(3 + j) * LANES + lane] = first[j, which]
                     hold[(6 + j) * LANES + lane] = second[j, which]
             cornered = instruments - 2 - block * LANES
-            _cubic_lanes(rows[run, block], corners[run], cornered, slow, hold, made[block])
+            _cubic_lanes(lanes[block], corners[run], cornered, slow, hold, made[block])
         for j in range(2):
             for k in range(states.shape[1]):
                 made[0, 3 + j, k] += made[0, j, k]
-        for row in range(sums.shape[1]):
-            block, lane = divmod(instruments - 2 + row, LANES)
-            for other in range(rows.shape[1]):
-                for j in range(LANES):
-                    sums[i, row, other, j] = _product(made[block, lane], made[other, j])
+        for row in range(chosen.size):
+            block, lane = divmod(chosen[row], LANES)
+            for j in range(2, instruments):
+                sums[i, row, j - 2] = _product(made[block, lane], made[j // LANES, j % LANES])
 
 
 @njit(cache=True, error_model="numpy")
@@ -293,4 +361,15 @@ def solve(matrix: Array, right: Array, limit: float, theta: Array) -> None:
                 theta[run, i, j] = both[i, n + j] if sound and math.isfinite(both[i, n + j]) else np.nan
 
 
-__all__ = ["LANES", "filter_rows", "left_sides", "remove", "respond", "response_sums", "solve"]
+__all__ = [
+    "LANES",
+    "filter_rows",
+    "grow_less",
+    "left_sides",
+    "orthonormal",
+    "products",
+    "remove",
+    "respond",
+    "response_sums",
+    "solve",
+]

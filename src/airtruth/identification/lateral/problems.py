@@ -11,14 +11,23 @@ radian per second or less, would make it an integrator of the noise.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.lateral.kernels import LANES, filter_rows, remove, respond, response_sums
+from airtruth.identification.lateral.kernels import (
+    LANES,
+    filter_rows,
+    grow_less,
+    orthonormal,
+    products,
+    remove,
+    respond,
+    response_sums,
+)
 from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
@@ -97,28 +106,30 @@ def rate_of(x: Array, dt_s: float) -> Array:
 
 def free_of(z: Array, x: Array, y: Array, columns: Array) -> Rows:
     """Rows orthogonal to the free columns (runs, columns, samples); they are made so in place."""
-    basis = np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(columns, 1, 2))[0], 1, 2))
+    basis = np.empty(columns.shape)
+    orthonormal(np.ascontiguousarray(columns), _INDEPENDENT, basis)
     for part in (x, y) if z is x else (x, y, z):
         remove(basis, part)
     return Rows(z, x, y, basis)
 
 
-def with_corners(o: LateralObservation) -> Array:
-    """Regressors whose surfaces have, sample by sample, the area that they have between the samples.
+def with_corners(o: LateralObservation, more: Sequence[Array] = ()) -> Array:
+    """Regressors whose surfaces have, sample by sample, the area that they have between the samples, and more rows.
 
     The corners of a servo behind a held command, sampled, change the moments of the surfaces by up to half a percent.
     """
-    x: Array = o.regressors.copy()
-    x[:, -len(CONTROLS) :, :-1] += 0.5 * (o.bend[..., :-1] + o.bend[..., 1:])
-    return x
+    width = o.regressors.shape[1]
+    made = np.concatenate([o.regressors, *more], axis=1)
+    made[:, width - len(CONTROLS) : width, :-1] += 0.5 * (o.bend[..., :-1] + o.bend[..., 1:])
+    return made
 
 
 def low_passed(o: LateralObservation, options: Options) -> tuple[Array, Array]:
     """Low-passed regressors (runs, signals, samples), and left sides (runs, coefficients, samples - 4) of their `_INSIDE`."""
     width = o.regressors.shape[1]
     moments = o.slopes[:, _MOMENTS]
-    both = np.concatenate([with_corners(o), o.added, moments], axis=1)
-    smooth = zero_phase(both, butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s))
+    sos = butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
+    smooth = zero_phase(with_corners(o, [o.added, moments]), sos, in_place=True)
     left = width + o.added.shape[1]
     y = smooth[:, width:left, _INSIDE].copy()
     y[:, _MOMENTS] += rate_of(smooth[:, left:], o.dt_s)
@@ -139,7 +150,9 @@ def smoothed(o: LateralObservation, options: Options) -> SmoothRows:
 
 def moments_of(rows: Rows) -> Array:
     """Sums Z X' and Z Y' (runs, signals, signals + coefficients)."""
-    return np.concatenate([np.matmul(rows.z, np.swapaxes(part, 1, 2)) for part in (rows.x, rows.y)], axis=2)
+    sums = np.empty((*rows.z.shape[:2], rows.x.shape[1] + rows.y.shape[1]))
+    products(rows.z, rows.x, rows.y, sums)
+    return sums
 
 
 def _all(theta: Array, active: Ints) -> Bools:
@@ -170,10 +183,8 @@ def lowpass_problem(o: LateralObservation, options: Options, smooth: SmoothRows)
     rows, u = smooth
     bend = smooth_bend(u)
     model = LinearModels.of(o)
-    states, signals = len(_STATES), rows.x.shape[1]
-    fixed = np.empty((len(u), signals, signals + rows.y.shape[1]))
-    for part, columns in ((rows.x, slice(signals)), (rows.y, slice(signals, None))):
-        fixed[:, states:, columns] = np.matmul(u[..., _INSIDE], np.swapaxes(part, 1, 2))
+    fixed = np.empty((len(u), len(LATERAL.signals), rows.x.shape[1] + rows.y.shape[1]))
+    products(np.ascontiguousarray(u[..., _INSIDE]), rows.x, rows.y, fixed[:, len(_STATES) :])
 
     def at(theta: Array, active: Ints) -> Rows:
         own = picked(rows, active)
@@ -200,29 +211,24 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
     The low-passed rows have no effect.
     """
     rates, constants = o.slopes[:, _MOMENTS], o.nuisance()
-    runs, count, samples = constants.shape
-    instruments = rates.shape[1] + o.added.shape[1] + o.regressors.shape[1]
-    last = instruments + len(_STATES) + count
-    blocks = -(-last // LANES)
-    room = np.zeros((runs, len(_STATES), samples))
-    unused = np.zeros((runs, blocks * LANES - last, samples))
-    given = np.concatenate([rates, o.added, o.regressors, room, constants, unused], axis=1)
-    rows = np.ascontiguousarray(np.swapaxes(given.reshape(runs, blocks, LANES, samples), 2, 3))
+    rows = np.concatenate([rates, o.added, constants, o.regressors], axis=1)
+    runs, instruments, samples = rows.shape
     u = np.ascontiguousarray(o.controls)
     bend = smooth_bend(u) + o.bend
     model = LinearModels.of(o)
-    y = slice(rates.shape[1], rates.shape[1] + o.added.shape[1])
-    x, free = slice(y.stop, instruments), slice(last - count, last)
-    # sums are those of the surfaces, the states and the constants
-    first = instruments - len(CONTROLS)
-    z = np.array([*range(instruments, free.start), *range(first, instruments)])
+    coefficients, count, first = o.added.shape[1], constants.shape[1], rates.shape[1]
+    y = slice(first, first + coefficients)
+    free, x = slice(y.stop, y.stop + count), slice(y.stop + count, instruments)
+    states = range(instruments, instruments + len(_STATES))
+    z = np.array([*states, *range(instruments - len(CONTROLS), instruments)])
+    chosen = np.array([*z, *range(free.start, free.stop)])
 
     def filtered(theta: Array, active: Ints, kept: int) -> tuple[Array, Array]:
-        out = np.empty((kept, blocks, LANES, samples))
-        sums = np.empty((active.size, last - first, blocks, LANES))
+        out = np.empty((kept, -(-(instruments + len(_STATES)) // LANES), LANES, samples))
+        sums = np.empty((active.size, chosen.size, instruments - first))
         systems = model.systems(theta, active)
-        filter_rows(systems, o.dt_s, u, bend, o.bend, active, model.rates, rows, instruments, out, sums)
-        return out.reshape(kept, -1, samples), sums.reshape(*sums.shape[:2], -1)
+        filter_rows(systems, o.dt_s, u, bend, o.bend, active, model.rates, rows, chosen, out, sums)
+        return out.reshape(kept, -1, samples), sums
 
     def at(theta: Array, active: Ints) -> Rows:
         out, _ = filtered(theta, active, active.size)
@@ -230,14 +236,13 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
 
     def moments(theta: Array, active: Ints) -> Array:
         _, sums = filtered(theta, active, 1)
-        squares = [sums[:, column - first, column] for column in range(free.start, free.stop)]
-        least = _INDEPENDENT * np.array(squares)
-        for number, column in enumerate(range(free.start, free.stop)):  # swept out one after another
-            pivot = sums[:, column - first, column]
-            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > least[number])
-            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, column - first]
-        own = sums[:, z - first]
-        return np.concatenate([own[:, :, x], own[:, :, y]], axis=2)
+        places = [(z.size + i, coefficients + i) for i in range(count)]
+        least = [_INDEPENDENT * sums[:, row, column] for row, column in places]
+        for (row, column), limit in zip(places, least, strict=True):  # constants are swept out one by one
+            pivot = sums[:, row, column]
+            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > limit)
+            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, row]
+        return np.concatenate([sums[:, : z.size, coefficients + count :], sums[:, : z.size, :coefficients]], axis=2)
 
     return LateralProblem(at, moments, model.bounded, runs)
 
@@ -296,27 +301,9 @@ class LinearModels:
     def bounded(self, theta: Array, active: Ints) -> Bools:
         """(active,) whether the motion grows by less than `GROWTH` over the record, by the fastest root."""
         a = self.systems(theta, active)[..., : -len(CONTROLS)]
-        return grow_less(a, np.log(GROWTH) / (self.dt_s * self.samples))
-
-
-def grow_less(a: Array, rate: float) -> Bools:
-    """(runs,) whether every root of the motions x' = a x of four states, (runs, 4, 4), has a real part below a rate [1/s].
-
-    The criterion of Routh and Hurwitz for a - rate I, whose characteristic polynomial follows from the traces of its powers:
-    eigenvalues take seven times as long. A matrix that is not finite has no such roots.
-    """
-    one = a - rate * np.eye(a.shape[-1])
-    two = np.matmul(one, one)
-    powers = [
-        np.einsum("rii->r", one),
-        *(np.einsum("rij,rji->r", x, y) for x, y in ((one, one), (two, one), (two, two))),
-    ]
-    c3 = -powers[0]
-    c2 = -0.5 * (c3 * powers[0] + powers[1])
-    c1 = -(c2 * powers[0] + c3 * powers[1] + powers[2]) / 3.0
-    c0 = -0.25 * (c1 * powers[0] + c2 * powers[1] + c3 * powers[2] + powers[3])
-    first = c3 * c2 - c1
-    return np.asarray((c3 > 0.0) & (c0 > 0.0) & (first > 0.0) & (first * c1 > c3**2 * c0))
+        less = np.empty(active.size, dtype=np.bool_)
+        grow_less(a, np.log(GROWTH) / (self.dt_s * self.samples), less)
+        return less
 
 
 __all__ = [
@@ -326,7 +313,6 @@ __all__ = [
     "SmoothRows",
     "f1_problem",
     "free_of",
-    "grow_less",
     "lowpass_problem",
     "ls_problem",
     "moments_of",
