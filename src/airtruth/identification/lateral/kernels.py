@@ -116,6 +116,30 @@ def products(z: Array, x: Array, y: Array, sums: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def systems_of(
+    theta: Array, runs: Ints, kinematics: Array, forces: Array, rates: Array, columns: Ints, made: Array
+) -> None:
+    """[A, B] (active, states, states + controls) of theta (active, derivatives).
+
+    Parameters
+    ----------
+    runs : (active,) numbers of the runs among all.
+    kinematics, forces, rates : of all runs, as of `airtruth.identification.lateral.problems.LinearModels`.
+    columns : columns of [A, B] of the signals.
+    """
+    for i in range(runs.size):
+        run = runs[i]
+        for row in range(made.shape[1]):
+            for column in range(made.shape[2]):
+                made[i, row, column] = kinematics[run, row, column]
+            for signal in range(columns.size):
+                total = 0.0
+                for j in range(forces.shape[2]):
+                    total += forces[run, row, j] * (theta[i, j * columns.size + signal] * rates[run, signal])
+                made[i, row, columns[signal]] += total
+
+
+@njit(cache=True, error_model="numpy")
 def grow_less(a: Array, rate: float, less: Bools) -> None:
     """Whether every root of the motions x' = a x of four states, (runs, 4, 4), has a real part below a rate [1/s], into (runs,).
 
@@ -145,22 +169,26 @@ def grow_less(a: Array, rate: float, less: Bools) -> None:
 
 @partial(inner, fastmath={"contract"})
 def _states(phi: Array, early: Array, late: Array, u: Array, bend: Array, scale: Array, out: Array) -> None:
-    """The first three of four states from rest, each with its factor, into out (3 or more, samples); inputs as in `respond`."""
+    """Four states from rest into out (4 or more, samples), the first three with their factors; inputs as in `respond`."""
     first, second, bend0, bend1 = u[0], u[1], bend[0], bend[1]
+    for i in range(4):
+        to, a0, a1, b0, b1 = out[i], early[i, 0], early[i, 1], late[i, 0], late[i, 1]
+        for k in range(1, u.shape[1]):
+            to[k] = (a0 * (first[k - 1] + bend0[k]) + b0 * (first[k] + bend0[k])) + (
+                a1 * (second[k - 1] + bend1[k]) + b1 * (second[k] + bend1[k])
+            )
+    p00, p01, p02, p03 = phi[0, 0], phi[0, 1], phi[0, 2], phi[0, 3]
+    p10, p11, p12, p13 = phi[1, 0], phi[1, 1], phi[1, 2], phi[1, 3]
+    p20, p21, p22, p23 = phi[2, 0], phi[2, 1], phi[2, 2], phi[2, 3]
+    p30, p31, p32, p33 = phi[3, 0], phi[3, 1], phi[3, 2], phi[3, 3]
     s0, s1, s2 = scale[0], scale[1], scale[2]
     x0 = x1 = x2 = x3 = 0.0
-    out[0, 0] = out[1, 0] = out[2, 0] = 0.0
+    out[0, 0] = out[1, 0] = out[2, 0] = out[3, 0] = 0.0
     for k in range(1, u.shape[1]):
-        a, b = first[k - 1] + bend0[k], first[k] + bend0[k]
-        c, d = second[k - 1] + bend1[k], second[k] + bend1[k]
-        e0 = (early[0, 0] * a + late[0, 0] * b) + (early[0, 1] * c + late[0, 1] * d)
-        e1 = (early[1, 0] * a + late[1, 0] * b) + (early[1, 1] * c + late[1, 1] * d)
-        e2 = (early[2, 0] * a + late[2, 0] * b) + (early[2, 1] * c + late[2, 1] * d)
-        e3 = (early[3, 0] * a + late[3, 0] * b) + (early[3, 1] * c + late[3, 1] * d)
-        y0 = (e0 + phi[0, 0] * x0 + phi[0, 1] * x1) + (phi[0, 2] * x2 + phi[0, 3] * x3)
-        y1 = (e1 + phi[1, 0] * x0 + phi[1, 1] * x1) + (phi[1, 2] * x2 + phi[1, 3] * x3)
-        y2 = (e2 + phi[2, 0] * x0 + phi[2, 1] * x1) + (phi[2, 2] * x2 + phi[2, 3] * x3)
-        x3 = (e3 + phi[3, 0] * x0 + phi[3, 1] * x1) + (phi[3, 2] * x2 + phi[3, 3] * x3)
+        y0 = (out[0, k] + p00 * x0 + p01 * x1) + (p02 * x2 + p03 * x3)
+        y1 = (out[1, k] + p10 * x0 + p11 * x1) + (p12 * x2 + p13 * x3)
+        y2 = (out[2, k] + p20 * x0 + p21 * x1) + (p22 * x2 + p23 * x3)
+        x3 = (out[3, k] + p30 * x0 + p31 * x1) + (p32 * x2 + p33 * x3)
         x0, x1, x2 = y0, y1, y2
         out[0, k], out[1, k], out[2, k] = s0 * x0, s1 * x1, s2 * x2
 
@@ -176,7 +204,7 @@ def respond(systems: Array, dt_s: float, u: Array, bend: Array, runs: Ints, scal
     u, bend : (all, 2, samples) input, linear between samples, and its additional mean over the cell that ends at each sample.
     runs : (active,) numbers of the runs among all.
     scale : (all, 3 or more) factors.
-    out : (active, 3 or more, samples), its first rows written.
+    out : (active, 4 or more, samples), its first four rows written, the last of them with the fourth state.
     """
     phi, noise, process = np.empty((4, 4)), np.empty((4, 4)), np.zeros(4)
     early, late = np.empty((4, 2)), np.empty((4, 2))
@@ -206,7 +234,7 @@ def response_sums(
     """
     phi, noise, process = np.empty((4, 4)), np.empty((4, 4)), np.zeros(4)
     early, late = np.empty((4, 2)), np.empty((4, 2))
-    states, inside = np.empty((3, u.shape[2])), x.shape[2]
+    states, inside = np.empty((4, u.shape[2])), x.shape[2]
     first = (u.shape[2] - inside) // 2
     for i in range(systems.shape[0]):
         run = runs[i]
@@ -291,7 +319,7 @@ def filter_rows(
     early, late = np.empty((4, 2)), np.empty((4, 2))
     system, slow = np.zeros((3, 5)), np.empty((3, 3))
     first, second, spread = np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 3))
-    hold, states = np.empty(10 * LANES), np.empty((3, rows.shape[2]))
+    hold, states = np.empty(10 * LANES), np.empty((4, rows.shape[2]))
     instruments, lanes = rows.shape[1], np.zeros((out.shape[1], rows.shape[2], LANES))
     for i in range(systems.shape[0]):
         run, a, made = runs[i], systems[i], out[i % out.shape[0]]
@@ -372,4 +400,5 @@ __all__ = [
     "respond",
     "response_sums",
     "solve",
+    "systems_of",
 ]

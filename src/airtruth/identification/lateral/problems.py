@@ -27,6 +27,7 @@ from airtruth.identification.lateral.kernels import (
     remove,
     respond,
     response_sums,
+    systems_of,
 )
 from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
 from airtruth.identification.options import Options
@@ -41,7 +42,7 @@ Bools = NDArray[np.bool_]
 
 _STATES: Final = [number for is_state, number in places(LATERAL) if is_state]
 """States among the signals, in the order of the signals."""
-_COLUMNS: Final = [number + (0 if is_state else len(LATERAL.states)) for is_state, number in places(LATERAL)]
+_COLUMNS: Final = np.array([n + (0 if is_state else len(LATERAL.states)) for is_state, n in places(LATERAL)])
 """Columns of [A, B] that belong to the signals."""
 _MOMENTS: Final = slice(1, None)
 """Coefficients whose left side is a rate: the side force is measured itself."""
@@ -281,9 +282,8 @@ class LinearModels:
 
     def systems(self, theta: Array, active: Ints) -> Array:
         """[A, B] (active, states, states + controls) of theta (active, 15)."""
-        made: Array = self.kinematics[active]
-        by_signal = theta.reshape(-1, *LATERAL.shape) * self.rates[active, None]
-        made[:, :, _COLUMNS] += np.matmul(self.forces[active], by_signal)
+        made = np.empty((active.size, *self.kinematics.shape[1:]))
+        systems_of(theta, active, self.kinematics, self.forces, self.rates, _COLUMNS, made)
         return made
 
     def instruments(self, theta: Array, active: Ints, u: Array, bend: Array) -> Array:
