@@ -154,10 +154,13 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
 def _add_right(d: Array, b: Array, out: Array) -> None:
     """Add d b, with derivatives along the last axis of d (n, n, slopes), to out (n, columns of b, slopes)."""
     for i in range(d.shape[0]):
-        for j in range(b.shape[1]):
-            for k in range(b.shape[0]):
+        for k in range(b.shape[0]):
+            moves = False
+            for f in range(d.shape[2]):
+                moves |= d[i, k, f] != 0.0
+            for j in range(b.shape[1]):
                 factor = b[k, j]
-                if factor != 0.0:
+                if moves and factor != 0.0:
                     for f in range(d.shape[2]):
                         out[i, j, f] += d[i, k, f] * factor
 

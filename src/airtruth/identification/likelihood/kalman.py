@@ -135,13 +135,10 @@ def _score_block(
     result.innovations[block] = least.residual.reshape(-1, samples, m)
     if free.size == 0 or runs.size == 0:
         return
-    moved = slopes(layout, runs, z, free, dt_s)
     # parameters that move the gain alone, as levels of noise do, come last
-    acts = np.logical_or.reduce(
-        [part.any(axis=(0, 2, 3)) for part in (moved.phi, moved.early, moved.c, moved.d)]
-    )
+    acts = np.isin(free, layout.location[layout.location[:, 0] == 0, 3:])
     order = np.argsort(~acts, kind="stable")
-    moved = Matrices(*(part[:, order] for part in moved))
+    moved = slopes(layout, runs, z, free[order], dt_s)
     d_white, d_gain_p = _differentiated(steady, moved)
     sums = _sums(steady, moved, d_gain_p, int(acts.sum()), base, least, drive)
     gradient, information = _scored(sums, d_white, least, samples)
