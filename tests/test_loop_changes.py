@@ -130,7 +130,7 @@ def test_a_simulation_that_does_not_move_is_left_out_and_a_lacking_channel_is_an
     """Only the first of two lateral records moves; without the yaw rate there is one clear error instead of an empty column."""
     t = np.arange(400) * 0.02
     moving = np.concatenate([np.sin(2.0 * t), np.zeros(400)])
-    channels = {name: moving for name in (*LATERAL.required, "phi_rad")}
+    channels = dict.fromkeys((*LATERAL.required, "phi_rad"), moving)
     log = FlightLog({}, ("moves", "rests"), np.array([0, 400, 800]), np.tile(t, 2), channels)
     (only,) = identifiable([log], Options(), LATERAL)
     assert only.run_ids == ("moves",)

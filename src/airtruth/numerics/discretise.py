@@ -1,6 +1,6 @@
 """From the terms of a predictor to its exact step and its steady prediction covariance, compiled.
 
-`assemble` and `step` take real or complex arrays, so that a complex step can check `step_slopes`.
+`assemble` and `step` take real or complex arrays, so that a complex step can check `airtruth.numerics.step_slopes`.
 
 Sources: E. K.-W. Chu et al., Int. J. Control 77(8), 2004 (structured doubling of the Riccati equation).
 """
@@ -14,11 +14,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.numerics.compiled import allocating, inner
+from airtruth.numerics.compiled import inner
 
 Array = NDArray[np.float64]
 Numbers = NDArray[Any]
 
+ORDER: Final = 16
+"""Terms of the power series of a step: the next one is below 1e-19."""
 DOUBLINGS: Final = 40
 """Most doublings of a step or of a power of a matrix."""
 
@@ -67,6 +69,21 @@ def congruence(a: Numbers, x: Numbers, work: Numbers, out: Numbers) -> None:
             out[j, i] = total
 
 
+@inner
+def halvings(system: Numbers, states: int, dt_s: float) -> int:
+    """Halvings of a step after which its series converges fast: the largest sum along a row of A times it is 1/2 at most."""
+    size, count = 0.0, 0
+    for i in range(states):
+        row = 0.0
+        for j in range(states):
+            row += abs(system[i, j])
+        size = max(size, row * dt_s)
+    while size > 0.5 and count < DOUBLINGS:
+        size *= 0.5
+        count += 1
+    return count
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignore[no-untyped-def]
     """Exact step x+ = phi x + early u + late u+ + n for inputs linear in between, n of covariance noise.
@@ -82,17 +99,8 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
     """
     n = states
     inputs = system.shape[1] - n
-    size = 0.0
-    for i in range(n):
-        row = 0.0
-        for j in range(n):
-            row += abs(system[i, j])
-        size = max(size, row * dt_s)
-    doublings, h, noisy = 0, dt_s, False
-    while size > 0.5 and doublings < DOUBLINGS:
-        size *= 0.5
-        h *= 0.5
-        doublings += 1
+    doublings, noisy = halvings(system, n, dt_s), False
+    h = dt_s * 0.5**doublings
     a = np.empty_like(phi)
     for i in range(n):
         for j in range(n):
@@ -107,7 +115,9 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
         power[i, i] = 1.0
         spread[i, i] = process[i] * h
         noisy |= process[i] != 0.0
-    for k in range(16):  # power = (A h)^k/k!; spread = k-th derivative of the noise covariance h^(k+1)/(k+1)!
+    for k in range(
+        ORDER
+    ):  # power = (A h)^k/k!; spread = k-th derivative of the noise covariance h^(k+1)/(k+1)!
         for i in range(n):
             for j in range(n):
                 phi[i, j] += power[i, j]
@@ -148,162 +158,6 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
                 ramp += twice[i, k] * system[k, n + j]
             late[i, j] = ramp / dt_s
             early[i, j] = total - ramp / dt_s
-
-
-@inner
-def _add_right(d: Array, b: Array, out: Array) -> None:
-    """Add d b, with derivatives along the last axis of d (n, n, slopes), to out (n, columns of b, slopes)."""
-    for i in range(d.shape[0]):
-        for k in range(b.shape[0]):
-            moves = False
-            for f in range(d.shape[2]):
-                moves |= d[i, k, f] != 0.0
-            for j in range(b.shape[1]):
-                factor = b[k, j]
-                if moves and factor != 0.0:
-                    for f in range(d.shape[2]):
-                        out[i, j, f] += d[i, k, f] * factor
-
-
-@inner
-def _add_both(x: Array, share: float, out: Array) -> None:
-    """Add share (x + x') to out, both (n, n, slopes)."""
-    for i in range(x.shape[0]):
-        for j in range(x.shape[0]):
-            for f in range(x.shape[2]):
-                out[i, j, f] += share * (x[i, j, f] + x[j, i, f])
-
-
-@allocating
-def step_slopes(
-    system: Array,
-    process: Array,
-    d_system: Array,
-    d_process: Array,
-    dt_s: float,
-    d_phi: Array,
-    d_early: Array,
-    d_late: Array,
-    d_noise: Array,
-) -> None:
-    """Derivatives of `step`: those of its series and of its doublings, term by term.
-
-    Parameters
-    ----------
-    system, process, dt_s : as in `step`.
-    d_system : (states or more, states + inputs, slopes) derivatives of the system; d_process : (states, slopes).
-    d_phi, d_early, d_late, d_noise : (n, n, slopes), (n, inputs, slopes) twice, (n, n, slopes), written.
-    """
-    n, count = d_process.shape
-    inputs = system.shape[1] - n
-    size = 0.0
-    for i in range(n):
-        row = 0.0
-        for j in range(n):
-            row += abs(system[i, j])
-        size = max(size, row * dt_s)
-    doublings, h = 0, dt_s
-    while size > 0.5 and doublings < DOUBLINGS:
-        size *= 0.5
-        h *= 0.5
-        doublings += 1
-    shape, flat = (n, n, count), (n, n * count)
-    a, d_a = np.empty((n, n)), np.empty(shape)
-    phi, once, twice, noise = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    power, spread, work = np.zeros((n, n)), np.zeros((n, n)), np.empty((n, n))
-    d_power, d_spread, d_once, d_twice = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    d_work, d_other = np.empty(shape), np.empty(shape)
-    d_phi[:] = 0.0
-    d_noise[:] = 0.0
-    for i in range(n):
-        power[i, i], spread[i, i] = 1.0, process[i] * h
-        for f in range(count):
-            d_spread[i, i, f] = d_process[i, f] * h
-        for j in range(n):
-            a[i, j] = system[i, j] * h
-            for f in range(count):
-                d_a[i, j, f] = d_system[i, j, f] * h
-    for k in range(16):  # as in `step`
-        first, second = h / (k + 1.0), h * h / ((k + 1.0) * (k + 2.0))
-        for i in range(n):
-            for j in range(n):
-                phi[i, j] += power[i, j]
-                once[i, j] += power[i, j] * first
-                twice[i, j] += power[i, j] * second
-                noise[i, j] += spread[i, j]
-                for f in range(count):
-                    d_phi[i, j, f] += d_power[i, j, f]
-                    d_once[i, j, f] += d_power[i, j, f] * first
-                    d_twice[i, j, f] += d_power[i, j, f] * second
-                    d_noise[i, j, f] += d_spread[i, j, f]
-        multiply(a, d_power.reshape(flat), d_work.reshape(flat))
-        _add_right(d_a, power, d_work)
-        multiply(a, power, work)
-        for i in range(n):
-            for j in range(n):
-                power[i, j] = work[i, j] / (k + 1.0)
-                for f in range(count):
-                    d_power[i, j, f] = d_work[i, j, f] / (k + 1.0)
-                    d_other[i, j, f] = d_spread[i, j, f]
-                    d_spread[i, j, f] = 0.0
-        multiply(a, d_other.reshape(flat), d_work.reshape(flat))
-        _add_right(d_a, spread, d_work)
-        _add_both(d_work, 1.0 / (k + 2.0), d_spread)
-        multiply(a, spread, work)
-        for i in range(n):
-            for j in range(n):
-                spread[i, j] = (work[i, j] + work[j, i]) / (k + 2.0)
-    for _ in range(doublings):
-        multiply(once, d_once.reshape(flat), d_work.reshape(flat))
-        _add_right(d_once, once, d_work)
-        multiply(phi, d_once.reshape(flat), d_other.reshape(flat))
-        _add_right(d_phi, once, d_other)
-        for i in range(n):
-            for j in range(n):
-                for f in range(count):
-                    d_twice[i, j, f] = 2.0 * d_twice[i, j, f] + d_work[i, j, f]
-                    d_once[i, j, f] += d_other[i, j, f]
-        multiply(once, once, work)
-        multiply(phi, once, power)
-        for i in range(n):
-            for j in range(n):
-                twice[i, j] = 2.0 * twice[i, j] + work[i, j]
-                once[i, j] += power[i, j]
-        multiply(phi, noise, work)
-        for i in range(n):
-            for j in range(n):
-                power[j, i] = work[i, j]
-        d_other[:] = 0.0
-        _add_right(d_phi, power, d_other)  # d_phi noise phi'
-        multiply(phi, d_noise.reshape(flat), d_work.reshape(flat))
-        for i in range(n):
-            for j in range(n):
-                power[j, i] = phi[i, j]
-        _add_right(d_work, power, d_noise)
-        _add_both(d_other, 1.0, d_noise)
-        congruence(phi, noise, work, power)
-        for i in range(n):
-            for j in range(n):
-                noise[i, j] += power[i, j]
-        multiply(phi, d_phi.reshape(flat), d_work.reshape(flat))
-        _add_right(d_phi, phi, d_work)
-        multiply(phi, phi, work)
-        for i in range(n):
-            for j in range(n):
-                phi[i, j] = work[i, j]
-                for f in range(count):
-                    d_phi[i, j, f] = d_work[i, j, f]
-    inward = np.ascontiguousarray(system[:n, n:])
-    d_inward = np.ascontiguousarray(d_system[:n, n:]).reshape((n, inputs * count))
-    multiply(once, d_inward, d_early.reshape((n, inputs * count)))
-    multiply(twice, d_inward, d_late.reshape((n, inputs * count)))
-    _add_right(d_once, inward, d_early)
-    _add_right(d_twice, inward, d_late)
-    for i in range(n):
-        for j in range(inputs):
-            for f in range(count):
-                d_late[i, j, f] /= dt_s
-                d_early[i, j, f] -= d_late[i, j, f]
 
 
 @inner

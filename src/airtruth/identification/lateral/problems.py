@@ -18,18 +18,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.lateral.kernels import (
-    LANES,
-    filter_rows,
-    grow_less,
-    orthonormal,
-    products,
-    remove,
-    respond,
-    response_sums,
-    systems_of,
-)
+from airtruth.identification.lateral.kernels import grow_less, orthonormal, products, remove, systems_of
 from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
+from airtruth.identification.lateral.responses import LANES, Driven, filter_rows, respond, response_sums
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
 from airtruth.numerics.prefilter import butterworth, zero_phase
@@ -51,6 +42,7 @@ _INSIDE: Final = slice(2, -2)
 _INDEPENDENT: Final = 1e-12
 """Square of a free column outside those before it, over its own, from which it counts as another [-]; judgement, four digits
 above rounding."""
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -196,9 +188,7 @@ def lowpass_problem(o: LateralObservation, options: Options, smooth: SmoothRows)
     def moments(theta: Array, active: Ints) -> Array:
         # regressors and left sides are orthogonal to the constants, so that the instruments need not be
         sums: Array = fixed[active]
-        response_sums(
-            model.systems(theta, active), o.dt_s, u, bend, active, model.rates, rows.x, rows.y, sums
-        )
+        response_sums(model.driven(theta, active, u, bend), rows.x, rows.y, sums)
         return sums
 
     return LateralProblem(at, moments, model.bounded, rows.x.shape[0])
@@ -227,13 +217,12 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
     def filtered(theta: Array, active: Ints, kept: int) -> tuple[Array, Array]:
         out = np.empty((kept, -(-(instruments + len(_STATES)) // LANES), LANES, samples))
         sums = np.empty((active.size, chosen.size, instruments - first))
-        systems = model.systems(theta, active)
-        filter_rows(systems, o.dt_s, u, bend, o.bend, active, model.rates, rows, chosen, out, sums)
+        filter_rows(model.driven(theta, active, u, bend), o.bend, rows, chosen, out, sums)
         return out.reshape(kept, -1, samples), sums
 
     def at(theta: Array, active: Ints) -> Rows:
         out, _ = filtered(theta, active, active.size)
-        return free_of(out[:, z], out[:, x].copy(), out[:, y].copy(), out[:, free])
+        return free_of(np.take(out, z, axis=1), out[:, x].copy(), out[:, y].copy(), out[:, free])
 
     def moments(theta: Array, active: Ints) -> Array:
         _, sums = filtered(theta, active, 1)
@@ -243,7 +232,9 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
             pivot = sums[:, row, column]
             share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > limit)
             sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, row]
-        return np.concatenate([sums[:, : z.size, coefficients + count :], sums[:, : z.size, :coefficients]], axis=2)
+        return np.concatenate(
+            [sums[:, : z.size, coefficients + count :], sums[:, : z.size, :coefficients]], axis=2
+        )
 
     return LateralProblem(at, moments, model.bounded, runs)
 
@@ -286,6 +277,10 @@ class LinearModels:
         systems_of(theta, active, self.kinematics, self.forces, self.rates, _COLUMNS, made)
         return made
 
+    def driven(self, theta: Array, active: Ints, u: Array, bend: Array) -> Driven:
+        """The models of theta (active, 15) driven by inputs (all runs, controls, samples)."""
+        return Driven(self.systems(theta, active), active, u, bend, self.rates, self.dt_s)
+
     def instruments(self, theta: Array, active: Ints, u: Array, bend: Array) -> Array:
         """States of the models driven by surfaces (all runs, controls, samples), and the surfaces, as the regressors.
 
@@ -294,7 +289,7 @@ class LinearModels:
         (active, signals, samples).
         """
         z = np.empty((active.size, len(LATERAL.signals), self.samples))
-        respond(self.systems(theta, active), self.dt_s, u, bend, active, self.rates, z)
+        respond(self.driven(theta, active, u, bend), z)
         z[:, len(_STATES) :] = u[active]
         return z
 

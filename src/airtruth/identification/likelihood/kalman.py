@@ -25,8 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.likelihood.kalman_kernel import (
+    Drive,
     Filter,
     KalmanSignals,
+    drive_of,
     predict,
     propagate,
 )
@@ -120,7 +122,7 @@ def _score_block(
     runs, z, block = runs[good], z[good], block[good]
     signals = KalmanSignals(*(part[runs] for part in signals))
     samples, m = signals.y.shape[1:]
-    drive = _drive(steady.step, signals)
+    drive = drive_of(steady.step, signals)
     base = _innovations(steady, drive)
     gram = np.matmul(np.swapaxes(base, 1, 2), base)
     states = slice(1, 1 + layout.sizes[0])
@@ -146,36 +148,7 @@ def _score_block(
     result.information[block[:, None, None], order[:, None], order] = information
 
 
-class _Drive(NamedTuple):
-    """Inputs of runs and what they add.
-
-    Attributes
-    ----------
-    u : (runs, samples, 3 inputs) the inputs at a sample, and at both ends of the cell that begins with it, with their bend.
-    drive, shown : as in `kalman_kernel.predict`.
-    """
-
-    u: Array
-    drive: Array
-    shown: Array
-
-    def of(self, good: Bools) -> _Drive:
-        """Those of some runs."""
-        return _Drive(*(part[good] for part in self))
-
-
-def _drive(step: Matrices, signals: KalmanSignals) -> _Drive:
-    y, u, bend = signals
-    inputs = u.shape[2]
-    every = np.zeros((*u.shape[:2], 3 * inputs))
-    every[:, :, :inputs] = u
-    np.add(u[:, :-1], bend[:, 1:], out=every[:, :-1, inputs : 2 * inputs])
-    np.add(u[:, 1:], bend[:, 1:], out=every[:, :-1, 2 * inputs :])
-    ends = np.concatenate([step.early, step.late], axis=2)
-    return _Drive(every, np.matmul(every[:, :, inputs:], _t(ends)), y - np.matmul(u, _t(step.d)))
-
-
-def _innovations(steady: Filter, drive: _Drive) -> Array:
+def _innovations(steady: Filter, drive: Drive) -> Array:
     """Whitened innovations of the data, and of a unit of each initial mean and bias.
 
     The latter are those of a system without inputs, [x; b]+ = [[phi - phi K C, -phi K], [0, I]] [x; b], e = -C x - b, from the
@@ -203,7 +176,7 @@ def _innovations(steady: Filter, drive: _Drive) -> Array:
     return made
 
 
-def _predicted(steady: Filter, drive: _Drive, nuisance: Array) -> tuple[Array, Array]:
+def _predicted(steady: Filter, drive: Drive, nuisance: Array) -> tuple[Array, Array]:
     """States and innovations (runs, samples, ...) from initial means and biases."""
     states, errors = np.empty_like(drive.drive), np.empty_like(drive.shown)
     phi, c = steady.step.phi, steady.step.c
@@ -238,7 +211,7 @@ def _sums(
     acting: int,
     base: Array,
     least: _Profile,
-    drive: _Drive,
+    drive: Drive,
 ) -> _TangentSums:
     """Sums over the derivatives along the trajectory of the estimated means and biases.
 
@@ -247,7 +220,7 @@ def _sums(
     steady : filters.
     moved, d_gain_p : derivatives of their step and of phi K, (runs, free, ...).
     acting : number of parameters that move more than the gain; they come first.
-    base, least : of `_innovations` and `_profile`.
+    base, least : of `_innovations` and `_profile`; drive : of `drive_of`.
     """
     runs, samples, m = drive.shown.shape
     n, count = steady.p.shape[1], d_gain_p.shape[1]
@@ -287,9 +260,10 @@ def _sums(
         )
         by_sample[:, count:] = base[run]
         np.matmul(by_sample.T, by_sample, out=sums[run])
-    own, across = sums[:, :count, :count], sums[:, :count, count:]
+    across = sums[:, :count, count:]
     at = np.concatenate([np.ones((runs, 1)), least.nuisance], axis=1)
-    return _TangentSums(own, across[:, :, 1:], np.matmul(across, at[:, :, None])[:, :, 0])
+    slope = np.matmul(across, at[:, :, None])[:, :, 0]
+    return _TangentSums(sums[:, :count, :count], across[:, :, 1:], slope)
 
 
 def _last(slopes: Array) -> Array:

@@ -51,6 +51,40 @@ class Filter(NamedTuple):
     gain_p: Array
 
 
+class Drive(NamedTuple):
+    """Inputs of runs and what they add.
+
+    Attributes
+    ----------
+    u : (runs, samples, 3 inputs) the inputs at a sample, and at both ends of the cell that begins with it, with their bend.
+    drive, shown : as in `predict`.
+    """
+
+    u: Array
+    drive: Array
+    shown: Array
+
+    def of(self, good: NDArray[np.bool_]) -> Drive:
+        """Those of some runs."""
+        return Drive(*(part[good] for part in self))
+
+
+def drive_of(step: Matrices, signals: KalmanSignals) -> Drive:
+    """Inputs of a step and what they add."""
+    y, u, bend = signals
+    inputs = u.shape[2]
+    every = np.zeros((*u.shape[:2], 3 * inputs))
+    every[:, :, :inputs] = u
+    np.add(u[:, :-1], bend[:, 1:], out=every[:, :-1, inputs : 2 * inputs])
+    np.add(u[:, 1:], bend[:, 1:], out=every[:, :-1, 2 * inputs :])
+    ends = np.concatenate([step.early, step.late], axis=2)
+    return Drive(
+        every,
+        np.matmul(every[:, :, inputs:], np.swapaxes(ends, 1, 2)),
+        y - np.matmul(u, np.swapaxes(step.d, 1, 2)),
+    )
+
+
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def predict(
     phi: Array,

@@ -9,7 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.identification.likelihood.predictor import LevelLayout
-from airtruth.numerics.discretise import assemble, step, step_slopes
+from airtruth.numerics.discretise import assemble, step
+from airtruth.numerics.step_slopes import StepSlopes, step_slopes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -112,8 +113,8 @@ def _differentiate(values: Array, free: Ints, terms: _Terms, dt_s: float, made: 
     system, process, variance = np.empty((n + m, n + inputs)), np.empty(n), np.empty(m)
     slope = np.empty((n + m, n + inputs, count))
     d_system, d_process = np.zeros((n, n + inputs, moving.size)), np.zeros((n, moving.size))
-    phi, noise = np.empty((n, n, moving.size)), np.empty((n, n, moving.size))
-    early, late = np.empty((n, inputs, moving.size)), np.empty((n, inputs, moving.size))
+    square, wide = (n, n, moving.size), (n, inputs, moving.size)
+    own = StepSlopes(np.empty(square), np.empty(wide), np.empty(wide), np.empty(square))
     for b in range(runs):
         assemble(values[b], terms.location, terms.coefficient[b], system, process, variance)
         slope[:] = 0.0
@@ -143,13 +144,13 @@ def _differentiate(values: Array, free: Ints, terms: _Terms, dt_s: float, made: 
                 for i in range(n):
                     for j in range(n + inputs):
                         d_system[i, j, among[f]] = slope[i, j, f]
-        step_slopes(system, process, d_system, d_process, dt_s, phi, early, late, noise)
+        step_slopes(system, process, d_system, d_process, dt_s, own)
         for f in range(count):
             g = among[f]
             for i in range(n):
                 for j in range(n):
-                    made.phi[b, f, i, j] = phi[i, j, g] if g >= 0 else 0.0
-                    made.noise[b, f, i, j] = noise[i, j, g] if g >= 0 else 0.0
+                    made.phi[b, f, i, j] = own.phi[i, j, g] if g >= 0 else 0.0
+                    made.noise[b, f, i, j] = own.noise[i, j, g] if g >= 0 else 0.0
                 for j in range(inputs):
-                    made.early[b, f, i, j] = early[i, j, g] if g >= 0 else 0.0
-                    made.late[b, f, i, j] = late[i, j, g] if g >= 0 else 0.0
+                    made.early[b, f, i, j] = own.early[i, j, g] if g >= 0 else 0.0
+                    made.late[b, f, i, j] = own.late[i, j, g] if g >= 0 else 0.0

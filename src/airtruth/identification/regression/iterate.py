@@ -140,7 +140,7 @@ def repeat(
 
 
 def _norms(x: Array) -> Array:
-    return np.sqrt(np.einsum("ri,ri->r", x, x))
+    return np.asarray(np.sqrt(np.einsum("ri,ri->r", x, x)))
 
 
 def _solution(moments: Array, factors: Array, intercept: bool, joint: bool) -> Array:
