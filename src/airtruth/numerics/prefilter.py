@@ -78,27 +78,33 @@ def edge_samples(sos: Array) -> int:
 
 
 @inner
-def _section(rows: Array, sos: Array, first: int, step: int, last: Array, before: Array) -> None:
-    """Run one section along rows in place, from sample ``first`` in direction ``step``.
+def _pass(rows: Array, sos: Array, first: int, step: int, last: Array, before: Array) -> None:
+    """Run the sections along rows in place, from sample ``first`` in direction ``step``.
 
-    Direct form II; the state starts where a constant equal to the first sample would have left it.
+    Direct form II; the state starts where a constant equal to the first sample would have left it. The sections follow one
+    another at each sample, because the recursion of each waits for its own last result.
 
     Parameters
     ----------
     rows : (samples, `LANES`): a sample of all rows is contiguous, so that they are filtered side by side.
-    last, before : (`LANES`,) room for the states.
+    last, before : (sections, `LANES`) room for the states.
     """
-    b0, b1, b2, a1, a2 = sos[0], sos[1], sos[2], sos[4], sos[5]
-    gain = 1.0 / (1.0 + a1 + a2)
     for lane in range(LANES):
-        last[lane] = before[lane] = rows[first, lane] * gain
+        x = rows[first, lane]
+        for i in range(sos.shape[0]):
+            b0, b1, b2, a1, a2 = sos[i, 0], sos[i, 1], sos[i, 2], sos[i, 4], sos[i, 5]
+            state = x * (1.0 / (1.0 + a1 + a2))
+            last[i, lane] = before[i, lane] = state
+            x = b0 * ((x - a2 * state) - a1 * state) + (b1 * state + b2 * state)
     k = first
     for _ in range(rows.shape[0]):
-        for lane in range(LANES):
-            s = (rows[k, lane] - a2 * before[lane]) - a1 * last[lane]
-            rows[k, lane] = b0 * s + (b1 * last[lane] + b2 * before[lane])
-            before[lane] = last[lane]
-            last[lane] = s
+        for i in range(sos.shape[0]):
+            b0, b1, b2, a1, a2 = sos[i, 0], sos[i, 1], sos[i, 2], sos[i, 4], sos[i, 5]
+            for lane in range(LANES):
+                s = (rows[k, lane] - a2 * before[i, lane]) - a1 * last[i, lane]
+                rows[k, lane] = b0 * s + (b1 * last[i, lane] + b2 * before[i, lane])
+                before[i, lane] = last[i, lane]
+                last[i, lane] = s
         k += step
 
 
@@ -106,7 +112,7 @@ def _section(rows: Array, sos: Array, first: int, step: int, last: Array, before
 def _zero_phase(x: Array, sos: Array, edge: int, work: Array, out: Array) -> None:
     rows, samples = x.shape
     padded = samples + 2 * edge
-    last, before = np.empty(LANES), np.empty(LANES)
+    last, before = np.empty((sos.shape[0], LANES)), np.empty((sos.shape[0], LANES))
     for start in range(0, rows, LANES):
         lanes = min(LANES, rows - start)
         for lane in range(lanes):
@@ -116,12 +122,8 @@ def _zero_phase(x: Array, sos: Array, edge: int, work: Array, out: Array) -> Non
                 work[edge + samples + i, lane] = 2.0 * row[samples - 1] - row[samples - 2 - i]
             for i in range(samples):
                 work[edge + i, lane] = row[i]
-        for way in range(
-            2
-        ):  # variables: numba compiles a function again for each constant that it is called with
-            first, step = (padded - 1) * way, 1 - 2 * way
-            for s in range(sos.shape[0]):
-                _section(work, sos[s], first, step, last, before)
+        for way in range(2):
+            _pass(work, sos, (padded - 1) * way, 1 - 2 * way, last, before)
         for lane in range(lanes):
             for i in range(samples):
                 out[start + lane, i] = work[edge + i, lane]
