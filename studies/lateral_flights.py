@@ -185,8 +185,16 @@ def causes_table(
     size = FLOWN[name][-1]
     error, _ = errors(list(joint(own, gtm, "filter-error", Options(), size)), truth)
     error /= least_deviations(own, gtm, truth, GUSTS[FLOWN[name][1]]) / np.sqrt(size)
-    found = np.degrees([steady_flight(one, Options()).attack[0] - attack_rad for one in own])
-    off = found[: len(error) * size].reshape(-1, size).mean(axis=1)
+    found = np.degrees(
+        [
+            (
+                steady_flight(one, Options()).attack[0] - attack_rad,
+                one.channels["alpha_rad"].mean() - attack_rad,
+            )
+            for one in own[: len(error) * size]
+        ]
+    )
+    off, whole = found.reshape(-1, size, 2).mean(axis=1).T
     bias, spread = error.mean(axis=0), error.std(axis=0, ddof=1)
     share = np.array([np.corrcoef(off, column)[0, 1] for column in error.T])
     rest = spread * np.sqrt(1.0 - share**2)
@@ -200,7 +208,8 @@ def causes_table(
     means = (f"{np.exp(np.log(np.abs(column)).mean()):.2f}" for column in columns)
     return flat(
         f"{name}: filter error, {len(error)} estimates of {size} runs, over the bound; steady angle of attack off by "
-        f"{off.mean():.3f} deg, deviation {off.std(ddof=1):.3f} deg",
+        f"{off.mean():.3f} deg, deviation {off.std(ddof=1):.3f} deg; mean of the "
+        f"records {whole.mean():.3f}, {whole.std(ddof=1):.3f} deg",
         ("derivative", *every),
         [*rows, ("geometric mean", *means)],
     )
