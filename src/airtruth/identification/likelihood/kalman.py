@@ -8,7 +8,7 @@ biases b are estimated with the parameters, exactly, since e is linear in them. 
     J = N/2 log|S| + 1/2 sum e' S^-1 e + 1/2 x0' M^-1 x0,   S = C P C' + R,
 
 at its least value over x0 and b (M: covariance of the means that are not free). The gradient is exact to rounding:
-derivatives of the step by complex step, of P by the discrete Lyapunov equation that the differentiated Riccati
+derivatives of the step by those of its series, of P by the discrete Lyapunov equation that the differentiated Riccati
 equation is, of e by the differentiated filter.
 
 Recursions over samples are compiled; the algebra of small matrices is vectorised over runs.
