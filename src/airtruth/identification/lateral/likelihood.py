@@ -56,9 +56,9 @@ Array = NDArray[np.float64]
 
 PROCESS_NOISE: Final = 0.02
 """Declared noise of p' and r' [rad/s per root second]; judgement: tables of an aircraft cause .01 to .05."""
-_START: Final = 0.15
+_START: Final = 0.2
 """Share of its declared size from which the search of that noise starts [-]; judgement: a linear aircraft in gusts has .03 to .1
-of it, tables .1 to .7, and a search from the whole takes a fifth more steps."""
+of it, tables .1 to .7, and a search from the whole takes up to a fifth more steps."""
 _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
 
