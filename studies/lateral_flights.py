@@ -4,8 +4,8 @@ Variants of data/campaigns/lateral.toml are flown: surfaces at 3 deg in light an
 light turbulence; and data/campaigns/lateral_multisine.toml. The campaign in moderate turbulence has twice the runs of the others,
 as in the paper. Every method estimates each run with the measured dynamic pressure, in the first two campaigns with the constant
 one as well, and joint sets of four runs, of the multisine of one. The Cramer-Rao bound of a set is that of a linear aircraft
-(`studies.lateral_study`). `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables, in short in OUT/page.md.
-An interrupted study continues.
+(`studies.lateral_study`); a table divides the errors of filter error by their causes. `airtruth tables` shows the single runs:
+files lateral-NAME.* of OUT/tables, in short in OUT/page.md. An interrupted study continues.
 
     python -m studies.lateral_flights --out DIR [--runs N] [--jobs J] [--single] [--only NAME] [METHOD ...]
 """
@@ -34,6 +34,7 @@ from airtruth.identification import (
     write_estimates,
 )
 from airtruth.identification.lateral.methods import lateral_values
+from airtruth.identification.lateral.observation import steady_flight
 from airtruth.logs.flight_log import Batch, batches
 from airtruth.logs.sources import log_files
 from airtruth.logs.store import read_log, read_table
@@ -172,6 +173,48 @@ def joint_table(
     return flat(f"{name}: RMSE of joint estimates of {size} runs [%]", columns, rows)
 
 
+def causes_table(
+    name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray, attack_rad: float
+) -> Table:
+    """Errors of joint estimates by filter error over the bound, and what the steady angle of attack explains of them.
+
+    Parameters
+    ----------
+    attack_rad : angle of attack of the trim, at which the truth holds.
+    """
+    size = FLOWN[name][-1]
+    error, _ = errors(list(joint(own, gtm, "filter-error", Options(), size)), truth)
+    error /= least_deviations(own, gtm, truth, GUSTS[FLOWN[name][1]]) / np.sqrt(size)
+    found = np.degrees(
+        [
+            (
+                steady_flight(one, Options()).attack[0] - attack_rad,
+                one.channels["alpha_rad"].mean() - attack_rad,
+            )
+            for one in own[: len(error) * size]
+        ]
+    )
+    off, whole = found.reshape(-1, size, 2).mean(axis=1).T
+    bias, spread = error.mean(axis=0), error.std(axis=0, ddof=1)
+    share = np.array([np.corrcoef(off, column)[0, 1] for column in error.T])
+    rest = spread * np.sqrt(1.0 - share**2)
+    total = np.sqrt((error**2).mean(axis=0))
+    columns = (total, bias, spread, rest, np.hypot(bias, rest))
+    every = ("error", "bias", "deviation", "deviation at the known angle", "error at the known angle")
+    rows = [
+        (parameter, *(f"{column[j]:.1f}" for column in columns))
+        for j, parameter in enumerate(LATERAL.parameters)
+    ]
+    means = (f"{np.exp(np.log(np.abs(column)).mean()):.2f}" for column in columns)
+    return flat(
+        f"{name}: filter error, {len(error)} estimates of {size} runs, over the bound; steady angle of attack off by "
+        f"{off.mean():.3f} deg, deviation {off.std(ddof=1):.3f} deg; mean of the "
+        f"records {whole.mean():.3f}, {whole.std(ddof=1):.3f} deg",
+        ("derivative", *every),
+        [*rows, ("geometric mean", *means)],
+    )
+
+
 def terms_table(name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray) -> Table:
     """Bias and standard deviation of single runs [% of the truth] with nonlinear terms."""
     rows = []
@@ -259,6 +302,9 @@ def main() -> None:
         own = records(folder)
         chosen = [m for m in asked.methods if m != "output-error"]
         print(as_markdown(joint_table(name, own, gtm, truth, chosen)), flush=True)
+        if FLOWN[name][-1] > 1 and "filter-error" in chosen:
+            attack = float(read_table(folder / "truth.parquet")["trim_alpha_rad"].iloc[0])
+            print(as_markdown(causes_table(name, own, gtm, truth, attack)), flush=True)
         if name.startswith("light"):
             print(as_markdown(terms_table(name, own, gtm, truth)), flush=True)
     print(write_tables(folders, asked.out / "tables").text)

@@ -6,11 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from airtruth.errors import LogError
+from airtruth.identification import Options
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.histories import Histories, History
 from airtruth.loop import loop_table
 from airtruth.loop.changes import changes_of, quantile
-from airtruth.loop.same_inputs import inputs_of, simulated_logs
+from airtruth.loop.same_inputs import identifiable, inputs_of, simulated_logs
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.table import as_text
 from airtruth.tracing.answer import Derivatives
@@ -122,3 +124,17 @@ def test_a_lateral_simulation_has_the_channels_that_every_log_needs():
     assert {"elevator_rad", "az_m_s2", "alpha_rad", "q_rad_s", "aileron_rad", "rudder_rad"} <= set(inputs)
     assert not {output.channel for output in LATERAL.outputs} & set(inputs)
     assert not {"az_m_s2", "alpha_rad", "q_rad_s", "theta_rad"} & set(inputs_of(LONGITUDINAL))
+
+
+def test_a_simulation_that_does_not_move_is_left_out_and_a_lacking_channel_is_an_error():
+    """Only the first of two lateral records moves; without the yaw rate there is one clear error instead of an empty column."""
+    t = np.arange(400) * 0.02
+    moving = np.concatenate([np.sin(2.0 * t), np.zeros(400)])
+    channels = dict.fromkeys((*LATERAL.required, "phi_rad"), moving)
+    log = FlightLog({}, ("moves", "rests"), np.array([0, 400, 800]), np.tile(t, 2), channels)
+    (only,) = identifiable([log], Options(), LATERAL)
+    assert only.run_ids == ("moves",)
+    assert identifiable([log.select(["rests"])], Options(), LATERAL) == []
+    lacking = log.select(None, [name for name in channels if name != "r_rad_s"])
+    with pytest.raises(LogError, match="the lateral motion needs the channel r_rad_s"):
+        identifiable([lacking], Options(), LATERAL)

@@ -9,9 +9,9 @@ from airtruth.identification import Options, identify, identify_batch, identify_
 from airtruth.identification.lateral.observation import condition_of, known_inputs
 from airtruth.identification.lateral.predictor import SURPLUS, factor_names, levels, predictor_of, records_of
 from airtruth.identification.likelihood.fit import scored
-from airtruth.identification.likelihood.linearise import values_of
+from airtruth.identification.likelihood.linearise import Matrices, slopes, values_of
 from airtruth.identification.likelihood.predictor import layout
-from airtruth.numerics.discretise import assemble
+from airtruth.numerics.discretise import assemble, step
 from airtruth.physics.lateral import lateral_system
 from airtruth.physics.motion import LATERAL
 from validation.affine_lateral import ALPHA, GTM, NAMES, THETA, fly, log_of, pitching
@@ -51,6 +51,33 @@ def test_predictor_has_the_matrices_of_the_linear_model():
     surplus = predictor.inputs.index(SURPLUS[0])
     np.testing.assert_allclose(system[1:3, n + surplus], linear.a[0, 1:3, 0], rtol=1e-12)
     np.testing.assert_allclose(process[1:3], 0.7**2)
+
+
+@pytest.mark.parametrize("gusts", [True, False])
+def test_slopes_of_the_step_are_those_of_a_complex_step(gusts):
+    """Nothing is subtracted in a complex step, so that it is exact to rounding."""
+    data = records_of(QUIET, GTM, Options(terms=("alpha",)), 533.4, gusts=gusts)
+    own, dt_s = data.layout, 0.05
+    z = np.linspace(-0.6, 0.5, own.sizes[3])
+    z[:15] = 1.1 * THETA
+    free = np.arange(own.sizes[3])[::-1]
+    made = slopes(own, np.array([1]), z[None], free, dt_s)
+    n, inputs, m, _ = own.sizes
+    values = values_of(own, z[None])[0]
+    for f, which in enumerate(free):
+        moved = values.astype(complex)
+        moved[which] += 1e-40j * (values[which] if own.logarithmic[which] else 1.0)
+        system = np.empty((n + m, n + inputs), dtype=complex)
+        process, variance = np.empty(n, dtype=complex), np.empty(m, dtype=complex)
+        phi, noise = np.empty((n, n), dtype=complex), np.empty((n, n), dtype=complex)
+        early, late = np.empty((n, inputs), dtype=complex), np.empty((n, inputs), dtype=complex)
+        assemble(moved, own.location, own.coefficient[1], system, process, variance)
+        step(system, process, n, dt_s, phi, early, late, noise)
+        expected = Matrices(phi, early, late, noise, system[n:, :n], system[n:, n:], variance)
+        for name, found, right in zip(Matrices._fields, made, expected, strict=True):
+            np.testing.assert_allclose(
+                found[0, f], right.imag / 1e-40, rtol=1e-11, atol=1e-13, err_msg=f"{name} of {which}"
+            )
 
 
 def test_gradient_is_that_of_differences():

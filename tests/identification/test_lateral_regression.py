@@ -10,9 +10,10 @@ from airtruth.identification import LATERAL_METHODS, identify_batch
 from airtruth.identification.doubts import curvature
 from airtruth.identification.estimates import Status, quantities
 from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
+from airtruth.identification.lateral.kernels import grow_less, orthonormal, products
 from airtruth.identification.lateral.methods import LINEAR
 from airtruth.identification.lateral.observation import observe
-from airtruth.identification.lateral.problems import grow_less, ls_problem, rate_of, smoothed
+from airtruth.identification.lateral.problems import ls_problem, rate_of, smoothed
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
 from airtruth.identification.options import TERMS, Options
 from airtruth.numerics.prefilter import butterworth, edge_samples
@@ -251,10 +252,29 @@ def test_methods_whose_intervals_leave_out_a_nonlinear_term_are_named():
     assert set(LATERAL_METHODS) - set(LINEAR) == {"filter-error"}
 
 
+def test_free_columns_are_orthonormal_and_one_that_depends_on_others_is_none():
+    """Against the projection by a QR factorisation; the third column is the sum of the first two."""
+    rng = np.random.default_rng(4)
+    columns = rng.standard_normal((2, 4, 60))
+    columns[:, 2] = columns[:, 0] + columns[:, 1]
+    basis = np.empty_like(columns)
+    orthonormal(columns, 1e-12, basis)
+    assert not basis[:, 2].any()
+    for own, found in zip(columns, basis, strict=True):
+        q = np.linalg.qr(own[[0, 1, 3]].T)[0]
+        np.testing.assert_allclose(found.T @ found, q @ q.T, atol=1e-13)
+    rows, sums = rng.standard_normal((2, 3, 60)), np.empty((2, 4, 7))
+    products(columns, rows, columns, sums)
+    np.testing.assert_allclose(sums[1, :, :3], columns[1] @ rows[1].T, atol=1e-12)
+    np.testing.assert_allclose(sums[1, :, 3:], columns[1] @ columns[1].T, atol=1e-12)
+
+
 def test_bounded_motions_are_those_of_the_eigenvalues():
     rng = np.random.default_rng(6)
     a = rng.standard_normal((4000, 4, 4)) * np.exp(rng.standard_normal((4000, 1, 1))) - 1.5 * np.eye(4)
     largest = np.linalg.eigvals(a).real.max(axis=1)
-    np.testing.assert_array_equal(grow_less(a, 0.7), largest < 0.7)
+    less = np.empty(4001, dtype=np.bool_)
+    grow_less(np.concatenate([a, np.full((1, 4, 4), np.nan)]), 0.7, less)
+    np.testing.assert_array_equal(less[:-1], largest < 0.7)
     assert 0.2 < (largest < 0.7).mean() < 0.8
-    assert not grow_less(np.full((1, 4, 4), np.nan), 0.7).any()
+    assert not less[-1]

@@ -9,7 +9,6 @@ from typing import Final
 
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
-from airtruth.errors import LogError
 from airtruth.identification import Options, identify
 from airtruth.identification.methods import DEFAULT, OF_MOTION
 from airtruth.identification.result import IdentificationResult
@@ -18,7 +17,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.loop.changes import changes_of
 from airtruth.loop.result import OUTPUTS, LoopResult
-from airtruth.loop.same_inputs import simulated_logs
+from airtruth.loop.same_inputs import identifiable, simulated_logs
 from airtruth.physics.motion import FOLDERS
 from airtruth.tracing import TraceOptions, TraceResult
 from airtruth.tracing.budget import Advance
@@ -160,21 +159,19 @@ def _identified_simulations(
     """Estimates of the declared and of the corrected model through the measured inputs; None where none can be identified."""
     corrected = [model for model in result.histories.models if model != "declared"][-1]
     declared_logs, corrected_logs = (
-        simulated_logs(logs, result.histories, model) for model in ("declared", corrected)
+        identifiable(simulated_logs(logs, result.histories, model), options or Options(), taken.motion)
+        for model in ("declared", corrected)
     )
     found: dict[str, IdentificationResult | None] = {"declared": None, "corrected": None}
     # the gate has admitted the inputs, and a simulation need not agree with the measured airspeed
-    try:
-        if declared_logs:
-            found["declared"] = identify(
-                declared_logs, aircraft, methods, options, force=True, motion=taken.motion
-            )
-        if corrected_logs:
-            found["corrected"] = identify_without_effects(
-                corrected_logs, aircraft, methods, taken, options, force=True
-            )
-    except LogError:  # a model that does not move, for example
-        return {"declared": None, "corrected": None}
+    if declared_logs:
+        found["declared"] = identify(
+            declared_logs, aircraft, methods, options, force=True, motion=taken.motion
+        )
+    if corrected_logs:
+        found["corrected"] = identify_without_effects(
+            corrected_logs, aircraft, methods, taken, options, force=True
+        )
     return found
 
 

@@ -13,7 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.logs.flight_log import FlightLog
+from airtruth.identification import Options
+from airtruth.identification.checks import check_channels, unfit
+from airtruth.logs.flight_log import FlightLog, batches
 from airtruth.logs.histories import Histories, History
 from airtruth.physics.motion import LONGITUDINAL, Motion, motion_with
 
@@ -63,6 +65,24 @@ def simulated_logs(logs: Sequence[FlightLog], histories: Histories, model: str) 
     return found
 
 
+def identifiable(logs: Sequence[FlightLog], options: Options, motion: Motion) -> list[FlightLog]:
+    """Return simulated records without the runs that hold no information, such as those of a model that does not move.
+
+    Raises
+    ------
+    LogError
+        If a log lacks a channel of the motion.
+    """
+    found = []
+    for log in logs:
+        check_channels(log, (), motion)
+        still = {run_id for b in batches(log) for one in unfit(b, options, motion) for run_id in one.run_ids}
+        moving = [run_id for run_id in log.run_ids if run_id not in still]
+        if moving:
+            found.append(log.select(moving))
+    return found
+
+
 def _is_whole(record: History, model: str, rows: slice) -> bool:
     outputs = record.models[model].values()
     return all(len(y) == rows.stop - rows.start and bool(np.isfinite(y).all()) for y in outputs)
@@ -77,4 +97,4 @@ def _simulated(log: FlightLog, known: dict[str, History], model: str) -> FlightL
     return replace(log, channels={**log.channels, **outputs})
 
 
-__all__ = ["inputs_of", "simulated_logs"]
+__all__ = ["identifiable", "inputs_of", "simulated_logs"]

@@ -1,6 +1,6 @@
 """From the terms of a predictor to its exact step and its steady prediction covariance, compiled.
 
-`assemble` and `step` take real or complex arrays: a complex step differentiates them to rounding.
+`assemble` and `step` take real or complex arrays, so that a complex step can check `airtruth.numerics.step_slopes`.
 
 Sources: E. K.-W. Chu et al., Int. J. Control 77(8), 2004 (structured doubling of the Riccati equation).
 """
@@ -19,10 +19,10 @@ from airtruth.numerics.compiled import inner
 Array = NDArray[np.float64]
 Numbers = NDArray[Any]
 
+ORDER: Final = 16
+"""Terms of the power series of a step: the next one is below 1e-19."""
 DOUBLINGS: Final = 40
 """Most doublings of a step or of a power of a matrix."""
-TINY: Final = 1e-40
-"""Imaginary part of a complex step; nothing is subtracted, so it may be as small as that."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -69,6 +69,21 @@ def congruence(a: Numbers, x: Numbers, work: Numbers, out: Numbers) -> None:
             out[j, i] = total
 
 
+@inner
+def halvings(system: Numbers, states: int, dt_s: float) -> int:
+    """Halvings of a step after which its series converges fast: the largest sum along a row of A times it is 1/2 at most."""
+    size, count = 0.0, 0
+    for i in range(states):
+        row = 0.0
+        for j in range(states):
+            row += abs(system[i, j])
+        size = max(size, row * dt_s)
+    while size > 0.5 and count < DOUBLINGS:
+        size *= 0.5
+        count += 1
+    return count
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignore[no-untyped-def]
     """Exact step x+ = phi x + early u + late u+ + n for inputs linear in between, n of covariance noise.
@@ -84,17 +99,8 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
     """
     n = states
     inputs = system.shape[1] - n
-    size = 0.0
-    for i in range(n):
-        row = 0.0
-        for j in range(n):
-            row += abs(system[i, j])
-        size = max(size, row * dt_s)
-    doublings, h, noisy = 0, dt_s, False
-    while size > 0.5 and doublings < DOUBLINGS:
-        size *= 0.5
-        h *= 0.5
-        doublings += 1
+    doublings, noisy = halvings(system, n, dt_s), False
+    h = dt_s * 0.5**doublings
     a = np.empty_like(phi)
     for i in range(n):
         for j in range(n):
@@ -109,7 +115,9 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
         power[i, i] = 1.0
         spread[i, i] = process[i] * h
         noisy |= process[i] != 0.0
-    for k in range(16):  # power = (A h)^k/k!; spread = k-th derivative of the noise covariance h^(k+1)/(k+1)!
+    for k in range(
+        ORDER
+    ):  # power = (A h)^k/k!; spread = k-th derivative of the noise covariance h^(k+1)/(k+1)!
         for i in range(n):
             for j in range(n):
                 phi[i, j] += power[i, j]

@@ -84,10 +84,8 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
     runs = increments.shape[0]
     if increments.shape[1] < 2:
         return np.full(runs, np.nan)
-    ratios, weights = _ratios(increments)
-    total = np.cumsum(weights, axis=1)
-    at = np.stack([np.argmax(total >= share * total[:, -1:], axis=1) for share in _QUANTILES], axis=1)
-    decays = np.take_along_axis(ratios, at, axis=1)
+    decays, sizes = np.full((runs, len(_QUANTILES)), np.nan), np.zeros((runs, len(_QUANTILES)))
+    _decays(np.ascontiguousarray(increments), np.array(_QUANTILES), decays, sizes)
     tried = np.concatenate([np.nan_to_num(decays), np.zeros((runs, 1)), np.full((runs, 1), declared)], axis=1)
     moving = np.empty_like(tried)
     _moving_cells(np.ascontiguousarray(increments), tried, _least_move(increments), moving)
@@ -96,7 +94,7 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
     is_fewer = moving[row, best] < _FEWER * np.minimum(moving[:, _MEDIAN], moving[:, _NONE])
     best = np.where(is_fewer, best, _MEDIAN)
     own = decays[row, best]
-    is_sure = own * weights[row, at[row, best]] >= _SURE * math.sqrt(2.0) * noise_std_rad
+    is_sure = own * sizes[row, best] >= _SURE * math.sqrt(2.0) * noise_std_rad
     agree = is_fewer | (decays[:, _QUARTER] > _AGREEING * decays[:, _MEDIAN])
     explains = moving[row, best] < np.fmax(_EXPLAINS, 1.0 - own) * moving[:, _NONE]
     own = np.where(agree & is_sure & explains, own, np.nan)
@@ -106,17 +104,33 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
         _LIKE_STEPS * moving[:, _NONE], _LIKE_OTHERS * moving[:, : len(_QUANTILES)].min(axis=1)
     )
     is_declared = moving[:, _DECLARED] <= others
-    return np.where(is_declared & (total[:, -1] > 0.0), declared, own)
+    return np.where(is_declared & (sizes[:, 0] > 0.0), declared, own)
 
 
-def _ratios(increments: Array) -> tuple[Array, Array]:
-    """Ratios of neighbouring increments (runs, ratios), least first, and their weights; NaN and zero where none counts."""
-    weights = np.abs(increments[:, :-1])
-    used = weights > _MOVING * np.abs(increments).max(axis=1, keepdims=True)
-    weights = np.where(used, weights, 0.0)
-    ratios = np.divide(increments[:, 1:], increments[:, :-1], out=np.full_like(weights, np.nan), where=used)
-    order = np.argsort(ratios, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
-    return np.take_along_axis(ratios, order, axis=1), np.take_along_axis(weights, order, axis=1)
+@njit(cache=True, error_model="numpy")
+def _decays(increments: Array, quantiles: Array, decays: Array, sizes: Array) -> None:
+    """Weighted quantiles (runs, quantiles) of the ratios of neighbouring increments, and the increments that they follow."""
+    cells = increments.shape[1] - 1
+    ratio, weight = np.empty(cells), np.empty(cells)
+    for run in range(increments.shape[0]):
+        move = increments[run]
+        largest = 0.0
+        for k in range(cells + 1):
+            largest = max(largest, abs(move[k]))
+        count, whole = 0, 0.0
+        for k in range(cells):
+            if abs(move[k]) > _MOVING * largest:
+                ratio[count], weight[count] = move[k + 1] / move[k], abs(move[k])
+                count += 1
+        order = np.argsort(ratio[:count], kind="mergesort")
+        for k in range(count):
+            whole += weight[order[k]]
+        total, number = 0.0, 0
+        for k in range(count):
+            total += weight[order[k]]
+            while number < quantiles.size and total >= quantiles[number] * whole:
+                decays[run, number], sizes[run, number] = ratio[order[k]], weight[order[k]]
+                number += 1
 
 
 def _least_move(increments: Array) -> Array:

@@ -19,6 +19,8 @@ from airtruth.numerics.compiled import inner
 Array = NDArray[np.float64]
 
 
+LANES: Final = 16
+"""Rows that are filtered side by side: four vectors, because each recursion waits for its own last result."""
 LEFT: Final = 0.04
 """Part of the slowest mode of the filter that remains at the end of an extension [-] (judgement: 0.3 s at 5 Hz)."""
 
@@ -76,30 +78,33 @@ def edge_samples(sos: Array) -> int:
 
 
 @inner
-def _section(rows: Array, sos: Array, first: int, step: int) -> None:
-    """Run one section along four rows in place, from sample ``first`` in direction ``step``.
+def _pass(rows: Array, sos: Array, first: int, step: int, last: Array, before: Array) -> None:
+    """Run the sections along rows in place, from sample ``first`` in direction ``step``.
 
-    Direct form II; the state starts where a constant equal to the first sample would have left it.
-    Four independent recursions run side by side, because each waits for its own last result.
+    Direct form II; the state starts where a constant equal to the first sample would have left it. The sections follow one
+    another at each sample, because the recursion of each waits for its own last result.
+
+    Parameters
+    ----------
+    rows : (samples, `LANES`): a sample of all rows is contiguous, so that they are filtered side by side.
+    last, before : (sections, `LANES`) room for the states.
     """
-    samples = rows.shape[1]
-    b0, b1, b2, a1, a2 = sos[0], sos[1], sos[2], sos[4], sos[5]
-    gain = 1.0 / (1.0 + a1 + a2)
-    s1 = s2 = rows[0, first] * gain
-    t1 = t2 = rows[1, first] * gain
-    u1 = u2 = rows[2, first] * gain
-    v1 = v2 = rows[3, first] * gain
+    for lane in range(LANES):
+        x = rows[first, lane]
+        for i in range(sos.shape[0]):
+            b0, b1, b2, a1, a2 = sos[i, 0], sos[i, 1], sos[i, 2], sos[i, 4], sos[i, 5]
+            state = x * (1.0 / (1.0 + a1 + a2))
+            last[i, lane] = before[i, lane] = state
+            x = b0 * ((x - a2 * state) - a1 * state) + (b1 * state + b2 * state)
     k = first
-    for _ in range(samples):
-        s = (rows[0, k] - a2 * s2) - a1 * s1
-        t = (rows[1, k] - a2 * t2) - a1 * t1
-        u = (rows[2, k] - a2 * u2) - a1 * u1
-        v = (rows[3, k] - a2 * v2) - a1 * v1
-        rows[0, k] = b0 * s + (b1 * s1 + b2 * s2)
-        rows[1, k] = b0 * t + (b1 * t1 + b2 * t2)
-        rows[2, k] = b0 * u + (b1 * u1 + b2 * u2)
-        rows[3, k] = b0 * v + (b1 * v1 + b2 * v2)
-        s2, s1, t2, t1, u2, u1, v2, v1 = s1, s, t1, t, u1, u, v1, v
+    for _ in range(rows.shape[0]):
+        for i in range(sos.shape[0]):
+            b0, b1, b2, a1, a2 = sos[i, 0], sos[i, 1], sos[i, 2], sos[i, 4], sos[i, 5]
+            for lane in range(LANES):
+                s = (rows[k, lane] - a2 * before[i, lane]) - a1 * last[i, lane]
+                rows[k, lane] = b0 * s + (b1 * last[i, lane] + b2 * before[i, lane])
+                before[i, lane] = last[i, lane]
+                last[i, lane] = s
         k += step
 
 
@@ -107,26 +112,24 @@ def _section(rows: Array, sos: Array, first: int, step: int) -> None:
 def _zero_phase(x: Array, sos: Array, edge: int, work: Array, out: Array) -> None:
     rows, samples = x.shape
     padded = samples + 2 * edge
-    for start in range(0, rows, 4):
-        for lane in range(min(4, rows - start)):
+    last, before = np.empty((sos.shape[0], LANES)), np.empty((sos.shape[0], LANES))
+    for start in range(0, rows, LANES):
+        lanes = min(LANES, rows - start)
+        for lane in range(lanes):
             row = x[start + lane]
             for i in range(edge):
-                work[lane, i] = 2.0 * row[0] - row[edge - i]
-                work[lane, edge + samples + i] = 2.0 * row[samples - 1] - row[samples - 2 - i]
+                work[i, lane] = 2.0 * row[0] - row[edge - i]
+                work[edge + samples + i, lane] = 2.0 * row[samples - 1] - row[samples - 2 - i]
             for i in range(samples):
-                work[lane, edge + i] = row[i]
-        for way in range(
-            2
-        ):  # variables: numba compiles a function again for each constant that it is called with
-            first, step = (padded - 1) * way, 1 - 2 * way
-            for s in range(sos.shape[0]):
-                _section(work, sos[s], first, step)
-        for lane in range(min(4, rows - start)):
+                work[edge + i, lane] = row[i]
+        for way in range(2):
+            _pass(work, sos, (padded - 1) * way, 1 - 2 * way, last, before)
+        for lane in range(lanes):
             for i in range(samples):
-                out[start + lane, i] = work[lane, edge + i]
+                out[start + lane, i] = work[edge + i, lane]
 
 
-def zero_phase(x: Array, sos: Array) -> Array:
+def zero_phase(x: Array, sos: Array, *, in_place: bool = False) -> Array:
     """Filter forward and backward along the last axis: twice the attenuation, no lag.
 
     Each end is extended by `edge_samples` samples of the record mirrored through its end point (odd
@@ -138,9 +141,10 @@ def zero_phase(x: Array, sos: Array) -> Array:
     ----------
     x : (..., samples), more samples than `edge_samples`.
     sos : (sections, 6) from `butterworth`.
+    in_place : write into x, which is contiguous.
     """
     rows = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
-    out = np.empty_like(rows)
+    out = rows if in_place else np.empty_like(rows)
     edge = edge_samples(sos)
-    _zero_phase(rows, sos, edge, np.zeros((4, rows.shape[1] + 2 * edge)), out)
+    _zero_phase(rows, sos, edge, np.zeros((rows.shape[1] + 2 * edge, LANES)), out)
     return out.reshape(x.shape)

@@ -1,4 +1,4 @@
-"""Compiled loops of the lateral regressions: left sides, response of the linear model, dynamic filter, normal equations."""
+"""Compiled loops of the lateral regressions: left sides, free constants, linear models, normal equations."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
-from airtruth.numerics.discretise import eliminate, step
+from airtruth.numerics.discretise import eliminate, multiply
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 Seven = tuple[float, float, float, float, float, float, float]
 
 
@@ -66,106 +67,103 @@ def remove(basis: Array, rows: Array) -> None:
                     rows[run, i, k] -= part * basis[run, j, k]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def respond(systems: Array, dt_s: float, u: Array, bend: Array, runs: Ints, scale: Array, out: Array) -> None:
-    """Response from rest of models of four states and two inputs: the first three states, each with its factor.
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+def orthonormal(columns: Array, least: float, basis: Array) -> None:
+    """Orthonormal rows (runs, columns, samples) of the space of ``columns``, by the modified Gram-Schmidt process, done twice.
 
-    Parameters
-    ----------
-    systems : (active, 4, 6) [A, B].
-    dt_s : sample period [s].
-    u, bend : (all, 2, samples) input, linear between samples, and its additional mean over the cell that ends at each sample.
-    runs : (active,) numbers of the runs among all.
-    scale : (active, 3) factors.
-    out : (active, 3 or more, samples), its first rows written.
+    A column is zero whose square outside those before it is at most ``least`` of its own.
     """
-    phi, noise, process = np.empty((4, 4)), np.empty((4, 4)), np.zeros(4)
-    early, late = np.empty((4, 2)), np.empty((4, 2))
-    for i in range(systems.shape[0]):
-        step(systems[i], process, 4, dt_s, phi, early, late, noise)
-        first, second, bend0, bend1 = u[runs[i], 0], u[runs[i], 1], bend[runs[i], 0], bend[runs[i], 1]
-        s0, s1, s2 = scale[i, 0], scale[i, 1], scale[i, 2]
-        x0 = x1 = x2 = x3 = 0.0
-        out[i, 0, 0] = out[i, 1, 0] = out[i, 2, 0] = 0.0
-        for k in range(1, u.shape[2]):
-            a, b = first[k - 1] + bend0[k], first[k] + bend0[k]
-            c, d = second[k - 1] + bend1[k], second[k] + bend1[k]
-            e0 = (early[0, 0] * a + late[0, 0] * b) + (early[0, 1] * c + late[0, 1] * d)
-            e1 = (early[1, 0] * a + late[1, 0] * b) + (early[1, 1] * c + late[1, 1] * d)
-            e2 = (early[2, 0] * a + late[2, 0] * b) + (early[2, 1] * c + late[2, 1] * d)
-            e3 = (early[3, 0] * a + late[3, 0] * b) + (early[3, 1] * c + late[3, 1] * d)
-            y0 = (e0 + phi[0, 0] * x0 + phi[0, 1] * x1) + (phi[0, 2] * x2 + phi[0, 3] * x3)
-            y1 = (e1 + phi[1, 0] * x0 + phi[1, 1] * x1) + (phi[1, 2] * x2 + phi[1, 3] * x3)
-            y2 = (e2 + phi[2, 0] * x0 + phi[2, 1] * x1) + (phi[2, 2] * x2 + phi[2, 3] * x3)
-            x3 = (e3 + phi[3, 0] * x0 + phi[3, 1] * x1) + (phi[3, 2] * x2 + phi[3, 3] * x3)
-            x0, x1, x2 = y0, y1, y2
-            out[i, 0, k], out[i, 1, k], out[i, 2, k] = s0 * x0, s1 * x1, s2 * x2
+    runs, count, samples = columns.shape
+    for run in range(runs):
+        for i in range(count):
+            before = 0.0
+            for k in range(samples):
+                basis[run, i, k] = columns[run, i, k]
+                before += columns[run, i, k] ** 2
+            for _ in range(2):
+                for j in range(i):
+                    part = 0.0
+                    for k in range(samples):
+                        part += basis[run, i, k] * basis[run, j, k]
+                    for k in range(samples):
+                        basis[run, i, k] -= part * basis[run, j, k]
+            after = 0.0
+            for k in range(samples):
+                after += basis[run, i, k] ** 2
+            size = 1.0 / math.sqrt(after) if after > least * before else 0.0
+            for k in range(samples):
+                basis[run, i, k] *= size
 
 
-@partial(inner, fastmath={"contract"})
-def _cubic_pair(x: Array, y: Array, more: Array, phi: Array, early: Array, late: Array, out: Array) -> None:
-    """The first state of 1/Delta(p), from rest, for x and y, into out (2, samples).
-
-    The input of a cell is linear, plus the constant that gives it the area of the cubic through four samples, plus ``more``
-    (2, samples). Two recursions run side by side because each waits for its own last result.
-    """
-    g0, g1, g2 = early[0, 0], early[1, 0], early[2, 0]
-    h0, h1, h2 = late[0, 0], late[1, 0], late[2, 0]
-    x0 = x1 = x2 = y0 = y1 = y2 = 0.0
-    out[0, 0] = out[1, 0] = 0.0
-    last = x.size - 1
-    for k in range(1, x.size):
-        before, after = max(k - 2, 0), min(k + 1, last)
-        area = (x[k - 1] + x[k] - x[before] - x[after]) * (1.0 / 24.0) + more[0, k]
-        a, b = x[k - 1] + area, x[k] + area
-        area = (y[k - 1] + y[k] - y[before] - y[after]) * (1.0 / 24.0) + more[1, k]
-        c, d = y[k - 1] + area, y[k] + area
-        t0 = (g0 * a + h0 * b) + phi[0, 0] * x0 + (phi[0, 1] * x1 + phi[0, 2] * x2)
-        t1 = (g1 * a + h1 * b) + phi[1, 0] * x0 + (phi[1, 1] * x1 + phi[1, 2] * x2)
-        x2 = (g2 * a + h2 * b) + phi[2, 0] * x0 + (phi[2, 1] * x1 + phi[2, 2] * x2)
-        x0, x1 = t0, t1
-        t0 = (g0 * c + h0 * d) + phi[0, 0] * y0 + (phi[0, 1] * y1 + phi[0, 2] * y2)
-        t1 = (g1 * c + h1 * d) + phi[1, 0] * y0 + (phi[1, 1] * y1 + phi[1, 2] * y2)
-        y2 = (g2 * c + h2 * d) + phi[2, 0] * y0 + (phi[2, 1] * y1 + phi[2, 2] * y2)
-        y0, y1 = t0, t1
-        out[0, k], out[1, k] = x0, y0
+@partial(inner, fastmath={"reassoc", "contract", "nsz"})
+def product(a: Array, b: Array) -> float:
+    total = 0.0
+    for k in range(a.size):
+        total += a[k] * b[k]
+    return total
 
 
 @njit(cache=True, error_model="numpy")
-def filter_rows(
-    cubics: Array, dt_s: float, rows: Array, bend: Array, runs: Ints, own: Array, out: Array
-) -> None:
-    """Filter rows of runs from rest by 1/Delta(p), Delta a cubic; the first rows are filtered by p/Delta(p).
+def products(z: Array, x: Array, y: Array, sums: Array) -> None:
+    """Sums (runs, rows of z, rows of x and y) of products of rows (runs, rows, samples)."""
+    for run in range(z.shape[0]):
+        for a in range(z.shape[1]):
+            for b in range(x.shape[1]):
+                sums[run, a, b] = product(z[run, a], x[run, b])
+            for b in range(y.shape[1]):
+                sums[run, a, x.shape[1] + b] = product(z[run, a], y[run, b])
 
-    Signals are linear between samples plus the area of the cubic through the four nearest.
+
+@njit(cache=True, error_model="numpy")
+def systems_of(
+    theta: Array, runs: Ints, kinematics: Array, forces: Array, rates: Array, columns: Ints, made: Array
+) -> None:
+    """[A, B] (active, states, states + controls) of theta (active, derivatives).
 
     Parameters
     ----------
-    cubics : (active, 3) c0, c1, c2 of Delta(p) = p^3 + c2 p^2 + c1 p + c0.
-    dt_s : sample period [s].
-    rows : (all, rows, samples), an even number, the first two for p/Delta, the last two with corners.
-    bend : (all, 2, samples) additional mean of the last rows over the cell that ends at each sample.
     runs : (active,) numbers of the runs among all.
-    own : (active, instruments, samples) further rows of the active runs, an even number.
-    out : (active, rows + instruments, samples), written.
+    kinematics, forces, rates : of all runs, as of `airtruth.identification.lateral.problems.LinearModels`.
+    columns : columns of [A, B] of the signals.
     """
-    count, samples = rows.shape[1], rows.shape[2]
-    system, process = np.zeros((3, 5)), np.zeros(3)
-    phi, noise, still = np.empty((3, 3)), np.empty((3, 3)), np.zeros((2, samples))
-    early, late = np.empty((3, 2)), np.empty((3, 2))
-    for i in range(cubics.shape[0]):
-        system[0, 1] = system[1, 2] = system[2, 3] = 1.0
-        system[2, 0], system[2, 1], system[2, 2] = -cubics[i, 0], -cubics[i, 1], -cubics[i, 2]
-        system[1, 4], system[2, 4] = 1.0, -cubics[i, 2]  # p/Delta in the first state: A times the other input
-        step(system, process, 3, dt_s, phi, early, late, noise)
-        given, made = rows[runs[i]], own[i]
-        _cubic_pair(given[0], given[1], still, phi, early[:, 1:], late[:, 1:], out[i, :2])
-        for row in range(2, count, 2):
-            more = still if row + 2 < count else bend[runs[i]]
-            _cubic_pair(given[row], given[row + 1], more, phi, early, late, out[i, row : row + 2])
-        for row in range(0, made.shape[0], 2):
-            to = out[i, count + row : count + row + 2]
-            _cubic_pair(made[row], made[row + 1], still, phi, early, late, to)
+    for i in range(runs.size):
+        run = runs[i]
+        for row in range(made.shape[1]):
+            for column in range(made.shape[2]):
+                made[i, row, column] = kinematics[run, row, column]
+            for signal in range(columns.size):
+                total = 0.0
+                for j in range(forces.shape[2]):
+                    total += forces[run, row, j] * (theta[i, j * columns.size + signal] * rates[run, signal])
+                made[i, row, columns[signal]] += total
+
+
+@njit(cache=True, error_model="numpy")
+def grow_less(a: Array, rate: float, less: Bools) -> None:
+    """Whether every root of the motions x' = a x of four states, (runs, 4, 4), has a real part below a rate [1/s], into (runs,).
+
+    The criterion of Routh and Hurwitz for a - rate I, whose characteristic polynomial follows from the traces of its powers:
+    eigenvalues take many times as long. A matrix that is not finite has no such roots.
+    """
+    one, two = np.empty((4, 4)), np.empty((4, 4))
+    for run in range(a.shape[0]):
+        for i in range(4):
+            for j in range(4):
+                one[i, j] = a[run, i, j] - (rate if i == j else 0.0)
+        multiply(one, one, two)
+        t1 = t2 = t3 = t4 = 0.0
+        for i in range(4):
+            t1 += one[i, i]
+            t2 += two[i, i]
+            for j in range(4):
+                t3 += two[i, j] * one[j, i]
+                t4 += two[i, j] * two[j, i]
+        c3 = -t1
+        c2 = -0.5 * (c3 * t1 + t2)
+        c1 = -(c2 * t1 + c3 * t2 + t3) / 3.0
+        c0 = -0.25 * (c1 * t1 + c2 * t2 + c3 * t3 + t4)
+        first = c3 * c2 - c1
+        less[run] = c3 > 0.0 and c0 > 0.0 and first > 0.0 and first * c1 > c3**2 * c0
 
 
 @njit(cache=True, error_model="numpy")
@@ -201,4 +199,4 @@ def solve(matrix: Array, right: Array, limit: float, theta: Array) -> None:
                 theta[run, i, j] = both[i, n + j] if sound and math.isfinite(both[i, n + j]) else np.nan
 
 
-__all__ = ["filter_rows", "left_sides", "remove", "respond", "solve"]
+__all__ = ["grow_less", "left_sides", "orthonormal", "product", "products", "remove", "solve", "systems_of"]

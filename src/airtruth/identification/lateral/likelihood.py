@@ -56,6 +56,9 @@ Array = NDArray[np.float64]
 
 PROCESS_NOISE: Final = 0.02
 """Declared noise of p' and r' [rad/s per root second]; judgement: tables of an aircraft cause .01 to .05."""
+_START: Final = 0.2
+"""Share of its declared size from which the search of that noise starts [-]; judgement: a linear aircraft in gusts has .03 to .1
+of it, tables .1 to .7, and a search from the whole takes up to a fifth more steps."""
 _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
 
@@ -81,9 +84,12 @@ def search_of(noise: Array, options: Options, *, gusts: bool) -> Search:
     )
 
 
-def _with_factors(theta: Array, options: Options) -> Array:
-    """Start of a search from derivatives (rows, 15): the factors of nonlinear terms, which follow them, start from zero."""
-    return np.concatenate([theta, np.zeros((len(theta), len(factor_names(options.terms))))], axis=1)
+def _start(theta: Array, search: Search, *, gusts: bool) -> Array:
+    """Start of a search from derivatives (rows, 15): factors of nonlinear terms from zero, levels as declared."""
+    start = np.concatenate([theta, search.declared[:, _COUNT:]], axis=1)
+    if gusts:
+        start[:, -len(PROCESS) :] += np.log(_START)
+    return start
 
 
 def _noise(batch: Batch, constants: AircraftConstants) -> Array:
@@ -107,7 +113,7 @@ def estimate(
         start = regress_batch(part, values, "ls", None, replace(options, covariance="none"))
         data = records_of(part, values, options, GUST_LENGTH_M, gusts=gusts)
         search = search_of(_noise(part, constants), options, gusts=gusts)
-        maxima = maximum_of_each(data, _with_factors(start.theta, options), search)
+        maxima = maximum_of_each(data, _start(start.theta, search, gusts=gusts), search)
         memory = memory_of(data, maxima.z)
         known = np.flatnonzero(np.isfinite(maxima.z).all(axis=1))
         if gusts and known.size:
@@ -148,7 +154,7 @@ def estimate_joint(
 
     data = read(options)
     search = search_of(np.median(noise, axis=0, keepdims=True), options, gusts=gusts)
-    maxima = joint_maximum(data, _with_factors(start.theta, options)[0], search)
+    maxima = joint_maximum(data, _start(start.theta, search, gusts=gusts)[0], search)
     each = [memory_of(d, np.repeat(maxima.z, d.signals.y.shape[0], axis=0)) for d in data]
     if gusts and np.isfinite(maxima.z).all():
         more = read(replace(options, terms=TERMS))

@@ -224,19 +224,16 @@ def integrated(rate: Array, dt_s: float) -> Array:
 def condition_of(batch: Batch, constants: LateralConstants, options: Options, known: Known) -> LateralScale:
     """Factors (runs,) of a constant flight condition, by ``options.condition``; "motion" weighs by the angular rates."""
     c = batch.channels
+    signals = (c["airspeed_m_s"], air_density(c), known.alpha, known.theta)
     if options.condition == "motion":
         weight = np.zeros_like(c["p_rad_s"])
         for name in ("p_rad_s", "r_rad_s"):
             weight += (c[name] - c[name].mean(axis=1, keepdims=True)) ** 2
         weight /= np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        airspeed, density, alpha, theta = (np.einsum("rn,rn->r", x, weight) for x in signals)
     else:
-        weight = np.zeros_like(c["p_rad_s"])
-        last = window_samples(options, batch.dt_s) if options.condition == "window" else weight.shape[1]
-        weight[:, :last] = 1.0 / last
-    airspeed, density, alpha, theta = (
-        np.einsum("rn,rn->r", x, weight)
-        for x in (c["airspeed_m_s"], air_density(c), known.alpha, known.theta)
-    )
+        last = window_samples(options, batch.dt_s) if options.condition == "window" else None
+        airspeed, density, alpha, theta = (x[:, :last].mean(axis=1) for x in signals)
     if options.airspeed_m_s is not None:
         airspeed = np.full_like(airspeed, options.airspeed_m_s)
     return lateral_scale(constants, airspeed, density, alpha, theta)
@@ -288,6 +285,10 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Late
     origin = regressors[..., :window].mean(axis=-1, keepdims=True)
     regressors -= origin
     surfaces = np.concatenate([c[name] for name in CONTROLS])
+    terms = np.empty((shape[0], 0, shape[1]))
+    if options.terms:
+        attack = change_of_attack(batch, steady_flight(batch, options).attack)
+        terms = nonlinear(regressors, attack, options.terms)
     return LateralObservation(
         dt_s=dt_s,
         regressors=regressors,
@@ -295,9 +296,7 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Late
         added=added,
         bend=np.stack(np.split(servo_bend(surfaces), len(CONTROLS)), axis=1),
         trend=known.trend,
-        terms=nonlinear(
-            regressors, change_of_attack(batch, steady_flight(batch, options).attack), options.terms
-        ),
+        terms=terms,
         scale=scale,
     )
 

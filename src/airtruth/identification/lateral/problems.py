@@ -11,15 +11,16 @@ radian per second or less, would make it an integrator of the noise.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.lateral.kernels import filter_rows, remove, respond
+from airtruth.identification.lateral.kernels import grow_less, orthonormal, products, remove, systems_of
 from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
+from airtruth.identification.lateral.responses import LANES, Driven, filter_rows, respond, response_sums
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
 from airtruth.numerics.prefilter import butterworth, zero_phase
@@ -32,7 +33,7 @@ Bools = NDArray[np.bool_]
 
 _STATES: Final = [number for is_state, number in places(LATERAL) if is_state]
 """States among the signals, in the order of the signals."""
-_COLUMNS: Final = [number + (0 if is_state else len(LATERAL.states)) for is_state, number in places(LATERAL)]
+_COLUMNS: Final = np.array([n + (0 if is_state else len(LATERAL.states)) for is_state, n in places(LATERAL)])
 """Columns of [A, B] that belong to the signals."""
 _MOMENTS: Final = slice(1, None)
 """Coefficients whose left side is a rate: the side force is measured itself."""
@@ -41,8 +42,6 @@ _INSIDE: Final = slice(2, -2)
 _INDEPENDENT: Final = 1e-12
 """Square of a free column outside those before it, over its own, from which it counts as another [-]; judgement, four digits
 above rounding."""
-_FAST: Final = 3
-"""Order of the dynamic filter: the states beta, p and r."""
 
 
 @dataclass(frozen=True)
@@ -100,28 +99,30 @@ def rate_of(x: Array, dt_s: float) -> Array:
 
 def free_of(z: Array, x: Array, y: Array, columns: Array) -> Rows:
     """Rows orthogonal to the free columns (runs, columns, samples); they are made so in place."""
-    basis = np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(columns, 1, 2))[0], 1, 2))
+    basis = np.empty(columns.shape)
+    orthonormal(np.ascontiguousarray(columns), _INDEPENDENT, basis)
     for part in (x, y) if z is x else (x, y, z):
         remove(basis, part)
     return Rows(z, x, y, basis)
 
 
-def with_corners(o: LateralObservation) -> Array:
-    """Regressors whose surfaces have, sample by sample, the area that they have between the samples.
+def with_corners(o: LateralObservation, more: Sequence[Array] = ()) -> Array:
+    """Regressors whose surfaces have, sample by sample, the area that they have between the samples, and more rows.
 
     The corners of a servo behind a held command, sampled, change the moments of the surfaces by up to half a percent.
     """
-    x: Array = o.regressors.copy()
-    x[:, -len(CONTROLS) :, :-1] += 0.5 * (o.bend[..., :-1] + o.bend[..., 1:])
-    return x
+    width = o.regressors.shape[1]
+    made = np.concatenate([o.regressors, *more], axis=1)
+    made[:, width - len(CONTROLS) : width, :-1] += 0.5 * (o.bend[..., :-1] + o.bend[..., 1:])
+    return made
 
 
 def low_passed(o: LateralObservation, options: Options) -> tuple[Array, Array]:
     """Low-passed regressors (runs, signals, samples), and left sides (runs, coefficients, samples - 4) of their `_INSIDE`."""
     width = o.regressors.shape[1]
     moments = o.slopes[:, _MOMENTS]
-    both = np.concatenate([with_corners(o), o.added, moments], axis=1)
-    smooth = zero_phase(both, butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s))
+    sos = butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
+    smooth = zero_phase(with_corners(o, [o.added, moments]), sos, in_place=True)
     left = width + o.added.shape[1]
     y = smooth[:, width:left, _INSIDE].copy()
     y[:, _MOMENTS] += rate_of(smooth[:, left:], o.dt_s)
@@ -142,7 +143,9 @@ def smoothed(o: LateralObservation, options: Options) -> SmoothRows:
 
 def moments_of(rows: Rows) -> Array:
     """Sums Z X' and Z Y' (runs, signals, signals + coefficients)."""
-    return np.concatenate([np.matmul(rows.z, np.swapaxes(part, 1, 2)) for part in (rows.x, rows.y)], axis=2)
+    sums = np.empty((*rows.z.shape[:2], rows.x.shape[1] + rows.y.shape[1]))
+    products(rows.z, rows.x, rows.y, sums)
+    return sums
 
 
 def _all(theta: Array, active: Ints) -> Bools:
@@ -173,28 +176,22 @@ def lowpass_problem(o: LateralObservation, options: Options, smooth: SmoothRows)
     rows, u = smooth
     bend = smooth_bend(u)
     model = LinearModels.of(o)
+    fixed = np.empty((len(u), len(LATERAL.signals), rows.x.shape[1] + rows.y.shape[1]))
+    products(np.ascontiguousarray(u[..., _INSIDE]), rows.x, rows.y, fixed[:, len(_STATES) :])
 
     def at(theta: Array, active: Ints) -> Rows:
         own = picked(rows, active)
-        return Rows(
-            np.ascontiguousarray(model.instruments(theta, active, u, bend)[..., _INSIDE]),
-            own.x,
-            own.y,
-            own.free,
-        )
+        z = np.ascontiguousarray(model.instruments(theta, active, u, bend)[..., _INSIDE])
+        remove(own.free, z)
+        return Rows(z, own.x, own.y, own.free)
 
-    def orthogonal(theta: Array, active: Ints) -> Rows:
-        made = at(theta, active)
-        remove(made.free, made.z)
-        return made
-
-    return LateralProblem(
-        orthogonal,
+    def moments(theta: Array, active: Ints) -> Array:
         # regressors and left sides are orthogonal to the constants, so that the instruments need not be
-        lambda theta, active: moments_of(at(theta, active)),
-        model.bounded,
-        rows.x.shape[0],
-    )
+        sums: Array = fixed[active]
+        response_sums(model.driven(theta, active, u, bend), rows.x, rows.y, sums)
+        return sums
+
+    return LateralProblem(at, moments, model.bounded, rows.x.shape[0])
 
 
 def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
@@ -204,45 +201,42 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
     linear between samples plus the area of the cubic through the four nearest; surfaces have the corners of their servo.
     The low-passed rows have no effect.
     """
-    count, controls, coefficients = len(LATERAL.signals), len(CONTROLS), len(LATERAL.coefficients)
-    constants = o.nuisance()
-    even = np.zeros((len(constants), constants.shape[1] % 2, constants.shape[2]))
-    rates = o.slopes[:, _MOMENTS]
-    given = np.concatenate([rates, o.added, constants, even, o.regressors], axis=1)
+    rates, constants = o.slopes[:, _MOMENTS], o.nuisance()
+    rows = np.concatenate([rates, o.added, constants, o.regressors], axis=1)
+    runs, instruments, samples = rows.shape
     u = np.ascontiguousarray(o.controls)
     bend = smooth_bend(u) + o.bend
     model = LinearModels.of(o)
-    y = slice(rates.shape[1], rates.shape[1] + coefficients)
-    free = slice(y.stop, y.stop + constants.shape[1])
-    x = slice(given.shape[1] - count, given.shape[1])
-    z = np.array([*range(x.stop, x.stop + len(_STATES)), *range(x.stop - controls, x.stop)])
+    coefficients, count, first = o.added.shape[1], constants.shape[1], rates.shape[1]
+    y = slice(first, first + coefficients)
+    free, x = slice(y.stop, y.stop + count), slice(y.stop + count, instruments)
+    states = range(instruments, instruments + len(_STATES))
+    z = np.array([*states, *range(instruments - len(CONTROLS), instruments)])
+    chosen = np.array([*z, *range(free.start, free.stop)])
 
-    def filtered(theta: Array, active: Ints) -> Array:
-        own = model.instruments(theta, active, u, bend)[:, : len(_STATES) + 1]
-        out = np.empty((active.size, given.shape[1] + own.shape[1], given.shape[2]))
-        filter_rows(model.cubics(theta, active), o.dt_s, given, o.bend, active, own, out)
-        out[:, y][:, _MOMENTS] += out[:, : y.start]
-        return out
+    def filtered(theta: Array, active: Ints, kept: int) -> tuple[Array, Array]:
+        out = np.empty((kept, -(-(instruments + len(_STATES)) // LANES), LANES, samples))
+        sums = np.empty((active.size, chosen.size, instruments - first))
+        filter_rows(model.driven(theta, active, u, bend), o.bend, rows, chosen, out, sums)
+        return out.reshape(kept, -1, samples), sums
 
     def at(theta: Array, active: Ints) -> Rows:
-        out = filtered(theta, active)
+        out, _ = filtered(theta, active, active.size)
         return free_of(np.take(out, z, axis=1), out[:, x].copy(), out[:, y].copy(), out[:, free])
 
     def moments(theta: Array, active: Ints) -> Array:
-        out = filtered(theta, active)[:, y.start : x.stop + len(_STATES)]
-        sums = np.matmul(out, np.swapaxes(out, 1, 2))
-        least = _INDEPENDENT * np.einsum("rii->ri", sums)
-        first = free.start - y.start
-        for column in range(
-            first, first + constants.shape[1]
-        ):  # the constants are swept out one after another
-            pivot = sums[:, column, column]
-            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > least[:, column])
-            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, column]
-        own, shift = np.take(sums, z - y.start, axis=1), y.start
-        return np.concatenate([own[:, :, x.start - shift : x.stop - shift], own[:, :, :coefficients]], axis=2)
+        _, sums = filtered(theta, active, 1)
+        places = [(z.size + i, coefficients + i) for i in range(count)]
+        least = [_INDEPENDENT * sums[:, row, column] for row, column in places]
+        for (row, column), limit in zip(places, least, strict=True):  # constants are swept out one by one
+            pivot = sums[:, row, column]
+            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > limit)
+            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, row]
+        return np.concatenate(
+            [sums[:, : z.size, coefficients + count :], sums[:, : z.size, :coefficients]], axis=2
+        )
 
-    return LateralProblem(at, moments, model.bounded, given.shape[0])
+    return LateralProblem(at, moments, model.bounded, runs)
 
 
 def smooth_bend(u: Array) -> Array:
@@ -279,10 +273,13 @@ class LinearModels:
 
     def systems(self, theta: Array, active: Ints) -> Array:
         """[A, B] (active, states, states + controls) of theta (active, 15)."""
-        made: Array = self.kinematics[active]
-        by_signal = theta.reshape(-1, *LATERAL.shape) * self.rates[active, None]
-        made[:, :, _COLUMNS] += np.matmul(self.forces[active], by_signal)
+        made = np.empty((active.size, *self.kinematics.shape[1:]))
+        systems_of(theta, active, self.kinematics, self.forces, self.rates, _COLUMNS, made)
         return made
+
+    def driven(self, theta: Array, active: Ints, u: Array, bend: Array) -> Driven:
+        """The models of theta (active, 15) driven by inputs (all runs, controls, samples)."""
+        return Driven(self.systems(theta, active), active, u, bend, self.rates, self.dt_s)
 
     def instruments(self, theta: Array, active: Ints, u: Array, bend: Array) -> Array:
         """States of the models driven by surfaces (all runs, controls, samples), and the surfaces, as the regressors.
@@ -292,42 +289,16 @@ class LinearModels:
         (active, signals, samples).
         """
         z = np.empty((active.size, len(LATERAL.signals), self.samples))
-        factors = np.ascontiguousarray(self.rates[active, : len(_STATES)])
-        respond(self.systems(theta, active), self.dt_s, u, bend, active, factors, z)
+        respond(self.driven(theta, active, u, bend), z)
         z[:, len(_STATES) :] = u[active]
         return z
-
-    def cubics(self, theta: Array, active: Ints) -> Array:
-        """c0, c1, c2 of |p I - A| = p^3 + c2 p^2 + c1 p + c0 of beta, p and r, (active, 3)."""
-        a = self.systems(theta, active)[:, :_FAST, :_FAST]
-        trace = np.trace(a, axis1=1, axis2=2)
-        second = 0.5 * (trace**2 - np.einsum("rij,rji->r", a, a))
-        return np.stack([-np.linalg.det(a), second, -trace], axis=1)
 
     def bounded(self, theta: Array, active: Ints) -> Bools:
         """(active,) whether the motion grows by less than `GROWTH` over the record, by the fastest root."""
         a = self.systems(theta, active)[..., : -len(CONTROLS)]
-        return grow_less(a, np.log(GROWTH) / (self.dt_s * self.samples))
-
-
-def grow_less(a: Array, rate: float) -> Bools:
-    """(runs,) whether every root of the motions x' = a x of four states, (runs, 4, 4), has a real part below a rate [1/s].
-
-    The criterion of Routh and Hurwitz for a - rate I, whose characteristic polynomial follows from the traces of its powers:
-    eigenvalues take seven times as long. A matrix that is not finite has no such roots.
-    """
-    one = a - rate * np.eye(a.shape[-1])
-    two = np.matmul(one, one)
-    powers = [
-        np.einsum("rii->r", one),
-        *(np.einsum("rij,rji->r", x, y) for x, y in ((one, one), (two, one), (two, two))),
-    ]
-    c3 = -powers[0]
-    c2 = -0.5 * (c3 * powers[0] + powers[1])
-    c1 = -(c2 * powers[0] + c3 * powers[1] + powers[2]) / 3.0
-    c0 = -0.25 * (c1 * powers[0] + c2 * powers[1] + c3 * powers[2] + powers[3])
-    first = c3 * c2 - c1
-    return np.asarray((c3 > 0.0) & (c0 > 0.0) & (first > 0.0) & (first * c1 > c3**2 * c0))
+        less = np.empty(active.size, dtype=np.bool_)
+        grow_less(a, np.log(GROWTH) / (self.dt_s * self.samples), less)
+        return less
 
 
 __all__ = [
@@ -337,7 +308,6 @@ __all__ = [
     "SmoothRows",
     "f1_problem",
     "free_of",
-    "grow_less",
     "lowpass_problem",
     "ls_problem",
     "moments_of",

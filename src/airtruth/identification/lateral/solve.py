@@ -126,9 +126,11 @@ def regress_batch(
 
 def _covariance(problem: LateralProblem, outcome: IterationOutcome, options: Options) -> Array:
     covariance = np.full((problem.runs, _COUNT, _COUNT), np.nan)
+    if options.covariance == "none":
+        return covariance
     known = np.flatnonzero(np.isin(outcome.status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS)))
     known = known[problem.usable(outcome.theta[known], known)]
-    if options.covariance == "none" or not known.size:
+    if not known.size:
         return covariance
     theta = outcome.theta[known]
     rows = problem.rows(theta, known)

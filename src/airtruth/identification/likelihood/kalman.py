@@ -8,7 +8,7 @@ biases b are estimated with the parameters, exactly, since e is linear in them. 
     J = N/2 log|S| + 1/2 sum e' S^-1 e + 1/2 x0' M^-1 x0,   S = C P C' + R,
 
 at its least value over x0 and b (M: covariance of the means that are not free). The gradient is exact to rounding:
-derivatives of the step by complex step, of P by the discrete Lyapunov equation that the differentiated Riccati
+derivatives of the step by those of its series, of P by the discrete Lyapunov equation that the differentiated Riccati
 equation is, of e by the differentiated filter.
 
 Recursions over samples are compiled; the algebra of small matrices is vectorised over runs.
@@ -25,8 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.likelihood.kalman_kernel import (
+    Drive,
     Filter,
     KalmanSignals,
+    drive_of,
     predict,
     propagate,
 )
@@ -120,35 +122,33 @@ def _score_block(
     runs, z, block = runs[good], z[good], block[good]
     signals = KalmanSignals(*(part[runs] for part in signals))
     samples, m = signals.y.shape[1:]
-    base = _innovations(steady, signals)
+    drive = drive_of(steady.step, signals)
+    base = _innovations(steady, drive)
     gram = np.matmul(np.swapaxes(base, 1, 2), base)
     states = slice(1, 1 + layout.sizes[0])
     gram[:, states, states] += layout.precision
     good = np.isfinite(gram).all(axis=(1, 2))
     if not good.all():
         runs, z, block, base, gram = runs[good], z[good], block[good], base[good], gram[good]
-        signals = KalmanSignals(*(part[good] for part in signals))
+        signals, drive = KalmanSignals(*(part[good] for part in signals)), drive.of(good)
         steady = _chosen(steady, good)
     least = _profile(base, gram, layout.precision, samples * steady.logdet)
     result.cost[block] = least.cost
     result.innovations[block] = least.residual.reshape(-1, samples, m)
     if free.size == 0 or runs.size == 0:
         return
-    moved = slopes(layout, runs, z, free, dt_s)
     # parameters that move the gain alone, as levels of noise do, come last
-    acts = np.logical_or.reduce(
-        [part.any(axis=(0, 2, 3)) for part in (moved.phi, moved.early, moved.c, moved.d)]
-    )
+    acts = np.isin(free, layout.location[layout.location[:, 0] == 0, 3:])
     order = np.argsort(~acts, kind="stable")
-    moved = Matrices(*(part[:, order] for part in moved))
+    moved = slopes(layout, runs, z, free[order], dt_s)
     d_white, d_gain_p = _differentiated(steady, moved)
-    sums = _sums(steady, moved, d_gain_p, int(acts.sum()), base, least, signals)
+    sums = _sums(steady, moved, d_gain_p, int(acts.sum()), base, least, drive)
     gradient, information = _scored(sums, d_white, least, samples)
     result.gradient[block[:, None], order] = gradient
     result.information[block[:, None, None], order[:, None], order] = information
 
 
-def _innovations(steady: Filter, signals: KalmanSignals) -> Array:
+def _innovations(steady: Filter, drive: Drive) -> Array:
     """Whitened innovations of the data, and of a unit of each initial mean and bias.
 
     The latter are those of a system without inputs, [x; b]+ = [[phi - phi K C, -phi K], [0, I]] [x; b], e = -C x - b, from the
@@ -158,10 +158,9 @@ def _innovations(steady: Filter, signals: KalmanSignals) -> Array:
     -------
     (runs, samples outputs, 1 + states + outputs).
     """
-    runs, samples, m = signals.y.shape
+    runs, samples, m = drive.shown.shape
     n = steady.p.shape[1]
-    states, errors = np.empty((runs, samples, n)), np.empty((runs, samples, m))
-    predict(steady.step, steady.gain_p, signals, np.zeros((runs, n + m)), states, errors)
+    _, errors = _predicted(steady, drive, np.zeros((runs, n + m)))
     made = np.empty((runs, samples * m, 1 + n + m))
     made[:, :, 0] = np.matmul(errors, _t(steady.white)).reshape(runs, -1)
     unit = np.broadcast_to(np.eye(m), (runs, m, m))
@@ -175,6 +174,14 @@ def _innovations(steady: Filter, signals: KalmanSignals) -> Array:
         own[:, done * m : (done + more) * m] = np.matmul(own[:, : more * m], power)
         power, done = np.matmul(power, power), done + more
     return made
+
+
+def _predicted(steady: Filter, drive: Drive, nuisance: Array) -> tuple[Array, Array]:
+    """States and innovations (runs, samples, ...) from initial means and biases."""
+    states, errors = np.empty_like(drive.drive), np.empty_like(drive.shown)
+    phi, c = steady.step.phi, steady.step.c
+    predict(phi, c, steady.gain_p, drive.drive, drive.shown, nuisance, states, errors)
+    return states, errors
 
 
 def _closed(steady: Filter) -> Array:
@@ -204,7 +211,7 @@ def _sums(
     acting: int,
     base: Array,
     least: _Profile,
-    signals: KalmanSignals,
+    drive: Drive,
 ) -> _TangentSums:
     """Sums over the derivatives along the trajectory of the estimated means and biases.
 
@@ -213,17 +220,16 @@ def _sums(
     steady : filters.
     moved, d_gain_p : derivatives of their step and of phi K, (runs, free, ...).
     acting : number of parameters that move more than the gain; they come first.
-    base, least : of `_innovations` and `_profile`.
+    base, least : of `_innovations` and `_profile`; drive : of `drive_of`.
     """
-    y, u, bend = signals
-    runs, samples, m = y.shape
-    n, inputs, count = steady.p.shape[1], u.shape[2], d_gain_p.shape[1]
-    states, errors = np.empty((runs, samples, n)), np.empty((runs, samples, m))
-    predict(steady.step, steady.gain_p, signals, least.nuisance, states, errors)
+    runs, samples, m = drive.shown.shape
+    n, count = steady.p.shape[1], d_gain_p.shape[1]
+    inputs = drive.u.shape[2] // 3
+    states, errors = _predicted(steady, drive, least.nuisance)
     # what a parameter adds to the prediction and to the innovation, per unit of each signal
     own = Matrices(*(part[:, :acting] for part in moved))
     gain_p, white = steady.gain_p[:, None], -steady.white
-    adds = [own.phi - gain_p @ own.c, -gain_p @ own.d, d_gain_p[:, :acting], own.early, own.late]
+    adds = [own.phi - gain_p @ own.c, -gain_p @ own.d, own.early, own.late, d_gain_p[:, :acting]]
     shows = [white[:, None] @ own.c, white[:, None] @ own.d]
     per_unit, per_output = _last(np.concatenate(adds, axis=3)), _last(np.concatenate(shows, axis=3))
     per_error = _last(d_gain_p[:, acting:])
@@ -231,24 +237,16 @@ def _sums(
         np.concatenate([part, np.zeros((*part.shape[:2], -n % 3))], axis=2)
         for part in (_closed(steady), np.matmul(white, steady.step.c))
     )
-    result = _TangentSums(
-        np.empty((runs, count, count)), np.empty((runs, count, n + m)), np.empty((runs, count))
-    )
-    tangents = np.empty((samples, m, count))
-    by_sample = tangents.reshape(-1, count)
+    width = 1 + n + m
+    sums = np.empty((runs, count + width, count + width))
+    both = np.empty((samples, m, count + width))
+    by_sample = both.reshape(-1, count + width)
     # one run after another, so that these arrays stay in the processor's cache
-    driving = np.zeros((samples, n + 3 * inputs + m))
+    driving = np.empty((samples, n + 3 * inputs + m))
     driven, shown = np.empty((samples, n * acting)), np.empty((samples, m * acting))
     by_error = np.empty((samples, n * (count - acting)))
-    ahead = n + inputs + m
     for run in range(runs):
-        driving[:, :n], driving[:, n : n + inputs], driving[:, n + inputs : ahead] = (
-            states[run],
-            u[run],
-            errors[run],
-        )
-        driving[:-1, ahead : ahead + inputs] = u[run, :-1] + bend[run, 1:]
-        driving[:-1, ahead + inputs :] = u[run, 1:] + bend[run, 1:]
+        driving[:, :n], driving[:, n:-m], driving[:, -m:] = states[run], drive.u[run], errors[run]
         np.matmul(driving, per_unit[run], out=driven)
         np.matmul(driving[:, : n + inputs], per_output[run], out=shown)
         np.matmul(errors[run], per_error[run], out=by_error)
@@ -258,12 +256,14 @@ def _sums(
             driven.reshape(samples, n, acting),
             by_error.reshape(samples, n, count - acting),
             shown.reshape(samples, m, acting),
-            tangents,
+            both,
         )
-        np.matmul(by_sample.T, by_sample, out=result.own[run])
-        np.matmul(by_sample.T, base[run, :, 1:], out=result.across[run])
-        np.matmul(least.residual[run], by_sample, out=result.slope[run])
-    return result
+        by_sample[:, count:] = base[run]
+        np.matmul(by_sample.T, by_sample, out=sums[run])
+    across = sums[:, :count, count:]
+    at = np.concatenate([np.ones((runs, 1)), least.nuisance], axis=1)
+    slope = np.matmul(across, at[:, :, None])[:, :, 0]
+    return _TangentSums(sums[:, :count, :count], across[:, :, 1:], slope)
 
 
 def _last(slopes: Array) -> Array:

@@ -51,46 +51,80 @@ class Filter(NamedTuple):
     gain_p: Array
 
 
+class Drive(NamedTuple):
+    """Inputs of runs and what they add.
+
+    Attributes
+    ----------
+    u : (runs, samples, 3 inputs) the inputs at a sample, and at both ends of the cell that begins with it, with their bend.
+    drive, shown : as in `predict`.
+    """
+
+    u: Array
+    drive: Array
+    shown: Array
+
+    def of(self, good: NDArray[np.bool_]) -> Drive:
+        """Those of some runs."""
+        return Drive(*(part[good] for part in self))
+
+
+def drive_of(step: Matrices, signals: KalmanSignals) -> Drive:
+    """Inputs of a step and what they add."""
+    y, u, bend = signals
+    inputs = u.shape[2]
+    every = np.zeros((*u.shape[:2], 3 * inputs))
+    every[:, :, :inputs] = u
+    np.add(u[:, :-1], bend[:, 1:], out=every[:, :-1, inputs : 2 * inputs])
+    np.add(u[:, 1:], bend[:, 1:], out=every[:, :-1, 2 * inputs :])
+    ends = np.concatenate([step.early, step.late], axis=2)
+    return Drive(
+        every,
+        np.matmul(every[:, :, inputs:], np.swapaxes(ends, 1, 2)),
+        y - np.matmul(u, np.swapaxes(step.d, 1, 2)),
+    )
+
+
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def predict(
-    step: Matrices, gain_p: Array, signals: KalmanSignals, nuisance: Array, states: Array, errors: Array
+    phi: Array,
+    c: Array,
+    gain_p: Array,
+    drive: Array,
+    shown: Array,
+    nuisance: Array,
+    states: Array,
+    errors: Array,
 ) -> None:
     """States and innovations along the records.
 
     Parameters
     ----------
-    step, gain_p : of the filters.
+    phi, c, gain_p : of the filters.
+    drive : (runs, samples, states) what the inputs add to the state from each sample to the next.
+    shown : (runs, samples, outputs) outputs less what the inputs add to them.
     nuisance : (runs, states + outputs) initial means and biases.
     states, errors : (runs, samples, states) and (runs, samples, outputs), written.
     """
-    phi, early, late, c, d = step.phi, step.early, step.late, step.c, step.d
-    y, u, bend = signals.y, signals.u, signals.bend
-    runs, samples, m = y.shape
-    n, inputs = phi.shape[1], u.shape[2]
+    runs, samples, m = shown.shape
+    n = phi.shape[1]
     for run in range(runs):
         for i in range(n):
             states[run, 0, i] = nuisance[run, i]
         for k in range(samples):
             for a in range(m):
-                total = y[run, k, a] - nuisance[run, n + a]
+                total = shown[run, k, a] - nuisance[run, n + a]
                 for i in range(n):
                     total -= c[run, a, i] * states[run, k, i]
-                for i in range(inputs):
-                    total -= d[run, a, i] * u[run, k, i]
                 errors[run, k, a] = total
             if k + 1 == samples:
                 break
             for i in range(n):
-                total = 0.0
+                total = drive[run, k, i]
                 for h in range(n):
                     total += phi[run, i, h] * states[run, k, h]
                 for a in range(m):
                     total += gain_p[run, i, a] * errors[run, k, a]
-                for h in range(inputs):
-                    more = bend[run, k + 1, h]
-                    total += early[run, i, h] * (u[run, k, h] + more) + late[run, i, h] * (
-                        u[run, k + 1, h] + more
-                    )
                 states[run, k + 1, i] = total
 
 
@@ -100,7 +134,7 @@ def _add(factors: Array, x: Array, out: Array) -> None:
     for h in range(0, x.shape[0], 3):
         first, second, third = factors[h], factors[h + 1], factors[h + 2]
         a, b, c = x[h], x[h + 1], x[h + 2]
-        for f in range(out.size):
+        for f in range(x.shape[1]):
             out[f] += first * a[f] + second * b[f] + third * c[f]
 
 
@@ -119,10 +153,10 @@ def propagate(
         a multiple of three.
     driven, shown : (samples, states, first) and (samples, outputs, first).
     by_error : (samples, states, others).
-    tangents : (samples, outputs, free), written.
+    tangents : (samples, outputs, free or more), the first of them written.
     """
     samples, n, first = driven.shape
-    count = tangents.shape[2]
+    count = first + by_error.shape[2]
     x, following = np.zeros((closed.shape[1], count)), np.zeros((closed.shape[1], count))
     for k in range(samples):
         for a in range(seen.shape[0]):

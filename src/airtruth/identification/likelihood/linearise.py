@@ -1,4 +1,4 @@
-"""Matrices of a predictor's exact step, and their derivatives with respect to the parameters by complex step."""
+"""Matrices of a predictor's exact step, and their derivatives with respect to the parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.identification.likelihood.predictor import LevelLayout
-from airtruth.numerics.discretise import TINY, assemble, step
+from airtruth.numerics.discretise import assemble, step
+from airtruth.numerics.step_slopes import StepSlopes, step_slopes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -97,36 +98,59 @@ def _empty(shape: tuple[int, ...], sizes: tuple[int, int, int, int]) -> Matrices
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _differentiate(values: Array, free: Ints, terms: _Terms, dt_s: float, made: Matrices) -> None:
     """Fill the derivatives; the step is differentiated only for parameters that act on it."""
     runs, count, n, inputs = made.early.shape
     m = made.variance.shape[2]
-    moved = np.empty(values.shape[1], dtype=np.complex128)
-    system = np.empty((n + m, n + inputs), dtype=np.complex128)
-    process, variance = np.empty(n, dtype=np.complex128), np.empty(m, dtype=np.complex128)
-    phi, noise = np.empty((n, n), dtype=np.complex128), np.empty((n, n), dtype=np.complex128)
-    early, late = np.empty((n, inputs), dtype=np.complex128), np.empty((n, inputs), dtype=np.complex128)
+    moving = free[terms.moves[free] == 1]
+    place, among = np.full(values.shape[1], -1), np.full(count, -1)
+    for f in range(count):
+        place[free[f]] = f
+        for g in range(moving.size):
+            if moving[g] == free[f]:
+                among[f] = g
+    system, process, variance = np.empty((n + m, n + inputs)), np.empty(n), np.empty(m)
+    slope = np.empty((n + m, n + inputs, count))
+    d_system, d_process = np.zeros((n, n + inputs, moving.size)), np.zeros((n, moving.size))
+    square, wide = (n, n, moving.size), (n, inputs, moving.size)
+    own = StepSlopes(np.empty(square), np.empty(wide), np.empty(wide), np.empty(square))
     for b in range(runs):
+        assemble(values[b], terms.location, terms.coefficient[b], system, process, variance)
+        slope[:] = 0.0
+        d_process[:] = 0.0
+        made.variance[b] = 0.0
+        for t in range(terms.location.shape[0]):
+            matrix, row, column = terms.location[t, 0], terms.location[t, 1], terms.location[t, 2]
+            for side in (3, 4):
+                which, other = terms.location[t, side], terms.location[t, 7 - side]
+                if which < 0 or place[which] < 0:
+                    continue
+                factor = terms.coefficient[b, t] * (values[b, other] if other >= 0 else 1.0)
+                factor *= values[b, which] if terms.logarithmic[which] == 1 else 1.0
+                if matrix == 0:
+                    slope[row, column, place[which]] += factor
+                elif matrix == 1:
+                    d_process[row, among[place[which]]] += factor
+                else:
+                    made.variance[b, place[which], row] += factor
         for f in range(count):
-            for i in range(moved.size):
-                moved[i] = values[b, i]
-            which = free[f]
-            moved[which] += 1j * TINY * (values[b, which] if terms.logarithmic[which] == 1 else 1.0)
-            assemble(moved, terms.location, terms.coefficient[b], system, process, variance)
-            acts = terms.moves[which] == 1
-            if acts:
-                step(system, process, n, dt_s, phi, early, late, noise)
+            for i in range(m):
+                for j in range(n):
+                    made.c[b, f, i, j] = slope[n + i, j, f]
+                for j in range(inputs):
+                    made.d[b, f, i, j] = slope[n + i, n + j, f]
+            if among[f] >= 0:
+                for i in range(n):
+                    for j in range(n + inputs):
+                        d_system[i, j, among[f]] = slope[i, j, f]
+        step_slopes(system, process, d_system, d_process, dt_s, own)
+        for f in range(count):
+            g = among[f]
             for i in range(n):
                 for j in range(n):
-                    made.phi[b, f, i, j] = phi[i, j].imag / TINY if acts else 0.0
-                    made.noise[b, f, i, j] = noise[i, j].imag / TINY if acts else 0.0
+                    made.phi[b, f, i, j] = own.phi[i, j, g] if g >= 0 else 0.0
+                    made.noise[b, f, i, j] = own.noise[i, j, g] if g >= 0 else 0.0
                 for j in range(inputs):
-                    made.early[b, f, i, j] = early[i, j].imag / TINY if acts else 0.0
-                    made.late[b, f, i, j] = late[i, j].imag / TINY if acts else 0.0
-            for a in range(m):
-                for j in range(n):
-                    made.c[b, f, a, j] = system[n + a, j].imag / TINY
-                for j in range(inputs):
-                    made.d[b, f, a, j] = system[n + a, n + j].imag / TINY
-                made.variance[b, f, a] = variance[a].imag / TINY
+                    made.early[b, f, i, j] = own.early[i, j, g] if g >= 0 else 0.0
+                    made.late[b, f, i, j] = own.late[i, j, g] if g >= 0 else 0.0

@@ -189,13 +189,13 @@ def maximise(evaluate: Callable[[Array, Ints], Scored], start: Array, search: Se
     Parameters
     ----------
     evaluate : (z (active, parameters), active) -> `Scored` of those groups.
-    start : (groups, derivatives); levels start at the centre of their prior.
+    start : (groups, derivatives), or levels too; levels that are not given start at the centre of their prior.
     search : parameters, prior, and how to search.
     """
-    count, free, declared = start.shape[1], search.free, search.declared
+    count, free, declared = search.level.start, search.free, search.declared
     problems = _Posterior(evaluate, declared, search.weight, free, search.level, search.to_prior)
     x = declared[:, free]
-    x[:, :count] = start
+    x[:, : start.shape[1]] = start
     how = SolverOptions(
         iterations=search.maximum_iterations,
         damping=DAMPING,

@@ -124,19 +124,24 @@ def repeat(
         if not joint:
             members, previous = active, theta[active]
         new = step(previous, members, iteration)
-        change = np.linalg.norm(new - theta[active], axis=1)
+        change = _norms(new - theta[active])
         iterations[active] += 1
         theta[active] = new
-        singular = ~np.isfinite(new).all(axis=1)
-        diverged = ~singular & (np.abs(new) > LARGEST).any(axis=1)
-        converged = ~singular & ~diverged & (change <= tolerance * np.linalg.norm(new, axis=1))
-        status[active[singular]] = Status.SINGULAR
-        status[active[diverged]] = Status.DIVERGED
+        largest = np.abs(new).max(axis=1)  # a NaN counts as the largest
+        sound = largest <= LARGEST
+        converged = sound & (change <= tolerance * _norms(new))
+        if not sound.all():
+            status[active[~np.isfinite(largest)]] = Status.SINGULAR
+            status[active[np.isfinite(largest) & ~sound]] = Status.DIVERGED
         status[active[converged]] = Status.CONVERGED
-        active = active[~(singular | diverged | converged)]
+        active = active[sound & ~converged]
     lost = ~np.isin(status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS))
     theta[lost] = np.nan
     return IterationOutcome(theta, status, iterations)
+
+
+def _norms(x: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("ri,ri->r", x, x)))
 
 
 def _solution(moments: Array, factors: Array, intercept: bool, joint: bool) -> Array:
