@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airtruth import aircraft
+from airtruth.aircraft import Sensor
 from airtruth.checks.gate import inspect
 from airtruth.checks.kinematics_lateral import check_lateral
 from airtruth.importers.sources import open_source
 from airtruth.logs.flight_log import FlightLog
+from airtruth.quantity import Quantity
 from airtruth.tracing import TraceOptions, trace
 from airtruth.units import DEG, FT
 
@@ -97,3 +100,16 @@ def test_a_trace_names_the_arm(parts):
     before, after = (answer["error"][stage]["held_out"]["free_run"] for stage in ("before", "after"))
     assert after["beta_rad"] < before["beta_rad"]
     assert after["r_rad_s"] < before["r_rad_s"]
+
+
+@pytest.mark.study
+def test_declared_the_arm_is_not_traced_again(parts):
+    plane = aircraft.load(HERE / "attas")
+    vane = plane.file.sensors["beta_rad"].model_dump() | {"x": Quantity(value=ARM_M)}
+    sensors = plane.file.sensors | {"beta_rad": Sensor.model_validate(vane)}
+    declared = plane.model_copy(update={"file": plane.file.model_copy(update={"sensors": sensors})})
+    options = TraceOptions(motion="lateral", hold_out=("aileron-1", "rudder-1"), increments=False)
+    answer = trace([parts], declared, options).to_dict()
+    print(answer["effects"])
+    assert all(e["name"] != "vane_arm" for e in answer["effects"])
+    assert all("vane_arm:beta_rad" not in e["indistinguishable_from"] for e in answer["effects"])
