@@ -1,9 +1,9 @@
 """Best-first search over sets of effects: quadratics predict their evidence, and the best are refitted.
 
-Quadratics about the declared aircraft, the fit without any effect and the best fit predict the evidence of every set of up to
-three effects. The best set without a refit is refitted from the predicted point, and its own quadratic gives its evidence with
-every explanation of the derivatives. A fit that leads is expanded in turn. The search ends when no set without a refit is
-expected within odds of one in twenty of the best one that records left out do not refuse.
+Quadratics about the declared aircraft, the fit without any effect and the best fit predict every set of up to three effects, and
+the best fit with a fourth one. The best set without a refit is refitted from the predicted point, and its own quadratic gives
+its evidence with every explanation of the derivatives. A fit that leads is expanded in turn. The search ends when no set
+without a refit is expected within odds of one in twenty of the best one that records left out do not refuse.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ from airtruth.tracing.selection.set_table import SAME, SetTable
 REFITS: Final = 30
 """Largest number of refits [-] (judgement: ten to forty seconds)."""
 MOST_EFFECTS: Final = 3
-"""Largest number of effects of a set that a quadratic predicts [-] (judgement: four in a few records have not been separable)."""
+"""Number of effects up to which a quadratic predicts every set; larger ones grow from its fit [-] (judgement: computing time)."""
+_LARGEST: Final = 4
+"""Largest number of effects of a set [-] (judgement: more in a few records have not been separable)."""
 _HELD: Final = 1e-4
 """Variance of derivatives that are held as they are declared, over the declared one [-] (judgement: a hundredth of a standard
 deviation)."""
@@ -169,9 +171,7 @@ class _BestFirst:
         """Refit a set from the declared aircraft; None where it cannot reach a rival."""
         hypothesis = replace(self.hypothesis, effects=effects)
         self.refits += 1
-        own = self.sets.fit_from_declared(hypothesis, np.array(sizes), self.null, rival)
-        self._enter(own)
-        return own
+        return self._enter(self.sets.fit_from_declared(hypothesis, np.array(sizes), self.null, rival))
 
     def _is_overfitted(self, fitted: PosteriorFit) -> bool:
         """Whether records left out refuse a possible fit: another set may explain them all.
@@ -182,8 +182,8 @@ class _BestFirst:
 
     def _is_misfit(self, fitted: PosteriorFit) -> bool:
         """Whether a fit leaves an anomaly beyond doubt."""
-        tests = anomalies(fitted, self.sets.problem, autoregression(fitted.innovations))
-        return len(tests) * min(test.p_value for test in tests) < CRITERION.certain
+        tests = [t.p_value for t in anomalies(fitted, self.sets.problem, autoregression(fitted.innovations))]
+        return len(tests) * min(tests) < CRITERION.certain
 
     def _sweep(self) -> None:
         """Refit every effect alone from the declared aircraft, until one of them leaves no anomaly beyond doubt.
@@ -232,7 +232,7 @@ class _BestFirst:
             at = id(expansion), self.temper
             if at not in self._read:
                 q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
-                every = q.sets(min(MOST_EFFECTS + 1, len(key) + 2))
+                every = q.sets(min(_LARGEST, len(key) + 1) + 1)
                 own = (w for w in every if q.in_filter(w) == key)
                 self._read[at] = [EvaluatedSet(expansion, q, w) for w in own]
             found += self._read[at]
@@ -262,10 +262,10 @@ class _BestFirst:
         at = id(expansion), self.temper
         if at not in self._told:
             q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
-            self._told[at] = {
-                q.in_filter(w): EvaluatedSet(expansion, q, w)
-                for w in sorted(q.sets(MOST_EFFECTS), key=lambda w: w.log_evidence)
-            }
+            own = range(len(expansion.last.hypothesis.effects))
+            every = q.sets(MOST_EFFECTS) + (q.grown(own) if MOST_EFFECTS <= len(own) < _LARGEST else [])
+            every.sort(key=lambda w: w.log_evidence)
+            self._told[at] = {q.in_filter(w): EvaluatedSet(expansion, q, w) for w in every}
         return self._told[at]
 
     def _following(self, best: EvaluatedSet) -> EvaluatedSet | None:
@@ -288,9 +288,8 @@ class _BestFirst:
 
         Far from its fit a quadratic errs by a share of the gain, and by the same share for effects that look alike.
         """
-        told = self._told_by(expansion)
+        told, ratios = self._told_by(expansion), [1.0]
         base = told.get(frozenset(e.key for e in expansion.last.hypothesis.effects))
-        ratios = [1.0]
         for key in self._fits:
             if base is None or told.get(key, base) is base:
                 continue
@@ -342,11 +341,12 @@ class _BestFirst:
                 own = self.sets.converged(hypothesis, again.point) or again
         self._enter(own)
 
-    def _enter(self, own: PosteriorFit | None) -> None:
-        """Keep a refit, unless it is worse than the null that its set contains: it ended far from its optimum."""
+    def _enter(self, own: PosteriorFit | None) -> PosteriorFit | None:
+        """Keep and return a refit, unless it is worse than the null that its set contains: it ended far from its optimum."""
         if own is not None and own.cost <= self.null.cost:
             key = frozenset(e.key for e in own.hypothesis.effects)
             self._fits.setdefault(key, []).append(expanded(self.sets.problem, own))
+        return own
 
     def _start(self, p: EvaluatedSet) -> tuple[Hypothesis, Parameters]:
         """The hypothesis of a set with its own prior of the derivatives, and the point where the quadratic is least."""

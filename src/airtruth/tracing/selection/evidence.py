@@ -187,6 +187,15 @@ class Quadratic:
                 found += [w for i in special for w in self._sets(declaration, (i,), 1)]
         return found
 
+    def grown(self, columns: Sequence[int]) -> list[Weighed]:
+        """A set as the derivatives are declared, and the set with each further effect."""
+        declaration, beside = self._declaration(()), tuple(columns)
+        found = self._sets(declaration, beside, 1)
+        for i, c in enumerate(self.columns):
+            if c.widens and all(c.may_join(self.columns[k]) for k in beside):
+                found += self._sets(declaration, (*beside, i), 0)
+        return found
+
     def without(self, weighed: Weighed, column: int) -> Weighed:
         """A set without one of its effects."""
         columns = tuple(i for i in weighed.columns if i != column)
