@@ -74,7 +74,7 @@ def record(y, aileron, rudder, plant_=None, sub=2, dt=DT, name="a", **known):
     def on(x, t):
         return x(t) if callable(x) else np.full(t.size, float(x))
 
-    own = {"v": V, "density": DENSITY, "theta": ALPHA, "alpha": ALPHA, "q": 0.0} | known
+    own = {"v": V, "density": DENSITY, "theta": ALPHA, "alpha": ALPHA, "q": 0.0, "ax": 0.0, "az": -G0} | known
     speed = on(own["v"], grid)
     signals = Signals(
         run_id=name,
@@ -91,6 +91,8 @@ def record(y, aileron, rudder, plant_=None, sub=2, dt=DT, name="a", **known):
         motion=LATERAL,
         alpha_rad=on(own["alpha"], grid),
         q_rad_s=on(own["q"], grid),
+        ax_m_s2=on(own["ax"], grid),
+        az_m_s2=on(own["az"], grid),
         control_std_rad=np.zeros(2),
         corner_rad2=np.zeros((2, 0)),
         surface_noise_rad2=np.zeros((2, 0)),

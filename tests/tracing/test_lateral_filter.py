@@ -33,6 +33,8 @@ SMOOTH = {
     "alpha": lambda t: lr.ALPHA + 0.02 * np.sin(1.1 * t),
     "theta": lambda t: lr.ALPHA + 0.05 * np.sin(0.7 * t),
     "q": lambda t: 0.1 * np.cos(1.3 * t),
+    "ax": lambda t: 1.0 + 0.5 * np.sin(0.9 * t),
+    "az": lambda t: -G0 + 2.0 * np.sin(1.7 * t),
 }
 
 
@@ -94,9 +96,8 @@ def flown(
             cy = (cy + gain * beta_dot(0.0)) / (1.0 - gain * (beta_dot(1.0) - beta_dot(0.0)))
         rate = beta_dot(cy)
         cn += cn_beta_dot * rate * half
-        lift = m * (v * q + G0 * np.cos(theta) * np.cos(phi))
-        roll = force * c.span_m * cl + moved[1] * lift
-        yaw = force * c.span_m * cn + moved[0] * force * cy + moved[1] * m * G0 * np.sin(theta) + yaw_n_m
+        roll = force * c.span_m * cl - moved[1] * m * SMOOTH["az"](t)
+        yaw = force * c.span_m * cn + moved[0] * force * cy + moved[1] * m * SMOOTH["ax"](t) + yaw_n_m
         roll += cross * p * q - (izz - iyy) * q * r
         yaw -= cross * q * r + (iyy - ixx) * p * q
         turn = np.linalg.solve(inertia, [roll, yaw])

@@ -296,7 +296,7 @@ LATERAL: Final = Motion(
         Control("aileron", "aileron_rad", "aileron_command_rad", "aileron_actuator", "da", "p_rad_s"),
         Control("rudder", "rudder_rad", "rudder_command_rad", "rudder_actuator", "dr", "r_rad_s"),
     ),
-    known=("airspeed_m_s", "density_kg_m3", "alpha_rad", "theta_rad", "q_rad_s"),
+    known=("airspeed_m_s", "density_kg_m3", "alpha_rad", "theta_rad", "q_rad_s", "ax_m_s2", "az_m_s2"),
     outputs=(
         Output("beta", "beta_rad", "vane", quantity="sideslip"),
         Output("p", "p_rad_s", "gyro", quantity="roll rate"),

@@ -250,7 +250,8 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
         airspeed = airspeed / declared.slope(alpha)
     known: dict[str, Any] = {}
     if s.motion is not LONGITUDINAL:
-        known = {n: true(n, getattr(s, n), s.sub) for n in ("alpha_rad", "q_rad_s", "theta_rad")}
+        beside = set(s.motion.known) - {"airspeed_m_s", "density_kg_m3"}
+        known = {n: true(n, getattr(s, n), s.sub) for n in beside}
         vane = aircraft.file.sensors.get("alpha_rad", Sensor()).errors()
         p = fine(s.y[:, s.motion.output_channels.index("p_rad_s")], s.sub)
         known["alpha_rad"] = known["alpha_rad"] + (vane.x_m * known["q_rad_s"] - vane.y_m * p) / airspeed

@@ -2,7 +2,8 @@
 
 States x: beta over ground [rad], p, r [rad/s], phi [rad], two Dryden states of unit variance, the side gust as the fin meets it,
 three low-passed copies of the first Dryden state, the roll gust of unit variance, then the states of effects. Airspeed, the
-speed without the gust along the path, angle of attack, pitch attitude and pitch rate are known inputs.
+speed without the gust along the path, angle of attack, pitch attitude, pitch rate and the specific forces along x and z are known
+inputs.
 
     beta' = p sin(alpha) - r cos(alpha) + (Y/m + g cos(theta) sin(phi))/(V cos(beta)) - V'/V tan(beta)
     Ixx p' - Ixz r' = L + Ixz p q - (Izz - Iyy) q r,   Izz r' - Ixz p' = N - Ixz q r - (Iyy - Ixx) p q
@@ -14,8 +15,8 @@ r - (v - v_late)/(tau V) with tau = 3 b/(pi V), its roll rate p - p_gust; p_gust
 (`airtruth.physics.lateral_gusts`). Both rotary gusts have the share ``rotary``.
 
 Forces: for each signal a table of Y, L, N over alpha and the signal, times q_bar; constants over alpha; increments of the
-derivatives; terms of `airtruth.physics.terms`. A CG that moves aft takes Y along; one that moves to the right leaves the lift at
-its left, whose moment is that of the load factor at a steady angle of attack, m (V q + g cos(theta) cos(phi)).
+derivatives; terms of `airtruth.physics.terms`. A CG that moves aft takes Y along; one that moves to the right by d leaves the
+other forces at its left, with the moments L = -d m az and N = d m ax of the measured specific forces, which follow the gusts.
 
 Sources: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1; V. Klein and E. A. Morelli,
 Aircraft System Identification, AIAA, 2006, 3.2; gusts, MIL-F-8785C, 3.7.1.2.
@@ -236,7 +237,6 @@ def rates(x: Array, at: LateralPoint, model: FilterModel, out: Array) -> float:
     fy, fl, fn = look_up(aircraft, signals)
     force = at.qbar_pa * aircraft.area_m2
     half, moved = half_time(at, model), at.ground_m_s * math.cos(x[0])
-    level = G0 * math.cos(at.theta_rad)
     unforced = turning(x, at)
     side, roll, yaw = at.side, at.roll, at.yaw
     if model.effects.amplitude.size > 0:
@@ -246,12 +246,12 @@ def rates(x: Array, at: LateralPoint, model: FilterModel, out: Array) -> float:
             added = terms(x, own, model.effects, turn == 1, half * force / (mass * moved))
             side, roll, yaw = side + added[0], roll + added[1], yaw + added[2]
     fy += force * side
-    lifted = mass * aircraft.cg_y_m
-    fl += force * aircraft.span_m * roll + lifted * (at.ground_m_s * q + level * math.cos(x[3]))
+    aside = mass * aircraft.cg_y_m
+    fl += force * aircraft.span_m * roll - aside * at.down_m_s2
     fn += (
         force * aircraft.span_m * yaw
         + aircraft.cg_shift * aircraft.chord_m * fy
-        + lifted * G0 * math.sin(at.theta_rad)
+        + aside * at.forward_m_s2
         + aircraft.yaw_moment_n_m
     )
     ixx, iyy = aircraft.inertia_xx_kg_m2, aircraft.inertia_yy_kg_m2
@@ -299,6 +299,8 @@ def air_at(grid: LateralGrid, point: int) -> LateralPoint:
         theta_rad=grid.theta_rad[point],
         q_rad_s=grid.q_rad_s[point],
         speed_rate_1_s=grid.speed_rate_1_s[point],
+        forward_m_s2=grid.forward_m_s2[point],
+        down_m_s2=grid.down_m_s2[point],
         side=grid.side[point],
         roll=grid.roll[point],
         yaw=grid.yaw[point],
@@ -328,9 +330,11 @@ def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
         theta_rad=at.theta_rad,
         q_rad_s=at.q_rad_s,
         speed_rate_1_s=at.speed_rate_1_s,
-        side=at.side + (by if field == 10 else 0.0),
-        roll=at.roll + (by if field == 11 else 0.0),
-        yaw=at.yaw + (by if field == 12 else 0.0),
+        forward_m_s2=at.forward_m_s2,
+        down_m_s2=at.down_m_s2,
+        side=at.side + (by if field == 12 else 0.0),
+        roll=at.roll + (by if field == 13 else 0.0),
+        yaw=at.yaw + (by if field == 14 else 0.0),
     )
 
 

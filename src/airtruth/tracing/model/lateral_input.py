@@ -63,6 +63,7 @@ class LateralPoint(NamedTuple):
     qbar_pa : dynamic pressure [Pa].
     alpha_rad, ground_alpha_rad : angle of attack of the air and over ground [rad]; theta_rad : pitch attitude [rad].
     q_rad_s : pitch rate [rad/s]; speed_rate_1_s : V'/V of the speed without the gust [1/s].
+    forward_m_s2, down_m_s2 : specific force along body x and z [m/s2].
     side, roll, yaw : increments of CY, Cl and Cn [-].
     """
 
@@ -76,6 +77,8 @@ class LateralPoint(NamedTuple):
     theta_rad: float
     q_rad_s: float
     speed_rate_1_s: float
+    forward_m_s2: float
+    down_m_s2: float
     side: float
     roll: float
     yaw: float
@@ -94,6 +97,8 @@ class LateralGrid(NamedTuple):
     theta_rad: Array
     q_rad_s: Array
     speed_rate_1_s: Array
+    forward_m_s2: Array
+    down_m_s2: Array
     side: Array
     roll: Array
     yaw: Array

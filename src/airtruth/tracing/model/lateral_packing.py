@@ -93,7 +93,7 @@ def _known(s: Signals, compiled: CompiledChange, air: AirPath) -> Sequence[Array
     """Known inputs of `LateralGrid`."""
     alpha, q = _angle_of_attack(compiled, s), compiled.undone("q_rad_s", s.q_rad_s)
     v, ground, qbar, theta = air
-    return v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s)
+    return v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s), s.ax_m_s2, s.az_m_s2
 
 
 PACKING: Final = Packing(LateralGrid, _known, pack_lateral, side_gusts)

@@ -251,10 +251,9 @@ def lateral_rate_slopes(
     ixx, iyy = aircraft.inertia_xx_kg_m2, aircraft.inertia_yy_kg_m2
     izz, ixz = aircraft.inertia_zz_kg_m2, aircraft.inertia_xz_kg_m2
     in_roll, in_yaw, across = (izz - iyy) * q, (iyy - ixx) * q, ixz * q
-    off_centre = mass * aircraft.cg_y_m * G0 * math.cos(at.theta_rad) * math.sin(x[3])
     arm = aircraft.cg_shift * aircraft.chord_m
     for p in range(d_fl.size):
-        d_fl[p] += across * d_x[1, p] - in_roll * d_x[2, p] - off_centre * d_x[3, p]
+        d_fl[p] += across * d_x[1, p] - in_roll * d_x[2, p]
     for p in range(d_fn.size):
         d_fn[p] += arm * d_fy[p] - across * d_x[2, p] - in_yaw * d_x[1, p]
     # the inertias alike: the moments of the air turn less, the coupling as before

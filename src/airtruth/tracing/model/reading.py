@@ -22,6 +22,7 @@ from airtruth.physics.motion_parts import Control
 from airtruth.tracing.model.damper import damper_surface, find_damper
 from airtruth.tracing.model.records import FINE, Signals, fine
 from airtruth.tracing.model.surface_path import LONGEST_STEP_S, Between, read_between
+from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ def read(
     that of the declared servo, or a spline (`airtruth.tracing.model.servo_surface`). What a damper moves follows from the
     angular rate that it feeds back (`airtruth.tracing.model.damper`). Airspeed
     and density are inputs, and their noise is not motion: the density is low-passed forward and backward at 5 Hz, and the
-    airspeed where its noise exceeds its gusts, or smoothed (`without_noise`). Known alpha and q are low-passed as the density is.
+    airspeed where its noise exceeds its gusts, or smoothed (`without_noise`). Known alpha, q, ax and az are low-passed as the density is.
     Attitude is measured, or the integral of the pitch rate from alpha at the start, level flight. In the lateral-directional
     motion an output without an instrument is reconstructed, and the flight is steady where a known input is absent
     (`airtruth.identification.lateral.observation.known_inputs`).
@@ -128,6 +129,8 @@ def read(
                 motion=motion,
                 alpha_rad=_known(channels, "alpha_rad", motion, dt, sub),
                 q_rad_s=_known(channels, "q_rad_s", motion, dt, sub),
+                ax_m_s2=_known(channels, "ax_m_s2", motion, dt, sub),
+                az_m_s2=_known(channels, "az_m_s2", motion, dt, sub),
                 control_std_rad=np.array([s.noise_std_rad for s in surfaces]),
                 corner_rad2=_together([s.between.corner_rad2 for s in surfaces], len(t)),
                 surface_noise_rad2=_together([s.noise_rad2 for s in surfaces], len(t)),
@@ -146,6 +149,8 @@ def _completed(logged: Mapping[str, Array], t_s: Array, dt_s: float) -> dict[str
         "alpha_rad": known.alpha,
         "theta_rad": known.theta,
         "q_rad_s": known.q,
+        "ax_m_s2": G0 * np.sin(known.theta),
+        "az_m_s2": -logged["airspeed_m_s"] * known.q - G0 * np.cos(known.theta) * np.cos(known.phi),
         "beta_rad": known.beta,
         "phi_rad": known.phi,
     }

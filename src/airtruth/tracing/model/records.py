@@ -29,6 +29,8 @@ _SERIES: Final = (
     "theta_rad",
     "alpha_rad",
     "q_rad_s",
+    "ax_m_s2",
+    "az_m_s2",
     "corner_rad2",
     "surface_noise_rad2",
 )
@@ -56,6 +58,7 @@ class Signals:
     throttle : its mean where it is logged, None elsewhere [0..1].
     motion : the motion whose outputs and controls they are.
     alpha_rad, q_rad_s : (points,) known inputs on the filter's grid [rad], [rad/s]; empty where they are outputs.
+    ax_m_s2, az_m_s2 : (points,) specific force along body x and z, likewise [m/s2].
     control_std_rad : (controls,) standard deviation of the noise that remains in each smoothed control [rad]; 0 behind a
         damper, which turns the surface throughout, so that a play does not rest at the extremes of the noise.
     corner_rad2 : (controls, samples) variance of a control's mean over the cell that ends at each sample, about that of
@@ -81,6 +84,8 @@ class Signals:
     motion: Motion = LONGITUDINAL
     alpha_rad: Array = field(default_factory=lambda: np.zeros(0))
     q_rad_s: Array = field(default_factory=lambda: np.zeros(0))
+    ax_m_s2: Array = field(default_factory=lambda: np.zeros(0))
+    az_m_s2: Array = field(default_factory=lambda: np.zeros(0))
     control_std_rad: Array = field(default_factory=lambda: np.zeros(1))
     corner_rad2: Array = field(default_factory=lambda: np.zeros((1, 0)))
     surface_noise_rad2: Array = field(default_factory=lambda: np.zeros((1, 0)))
