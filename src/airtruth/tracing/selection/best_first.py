@@ -356,8 +356,7 @@ class _BestFirst:
         x = np.zeros(len(q.columns))
         x[chosen] = sizes
         declared = q.most_probable(spread + of_cause + freed, x)
-        common = self.sets.problem.layout.common
-        at = [*range(common.derivatives.stop), common.inertia]
+        at = p.expansion.integrated
         point = p.expansion.point(chosen, sizes, dict(zip(at, declared.tolist(), strict=True)))
         effects = tuple(p.expansion.effects[i] for i in chosen)
         total = spread + of_cause

@@ -84,7 +84,7 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Quadratic:
-    """A negative log-likelihood as a quadratic of derivatives, inertia and sizes.
+    """A negative log-likelihood as a quadratic of what is integrated under its prior, the derivatives first, and of sizes.
 
     Attributes
     ----------

@@ -55,6 +55,13 @@ class Expansion:
     locations: tuple[Array, ...]
     tried: tuple[int, ...]
 
+    @property
+    def integrated(self) -> list[int]:
+        """Common parameters that an evidence integrates under their prior: derivatives, inertia, and the mounting, which shows
+        beside a shift of the CG alone."""
+        common = self.last.point.of.common
+        return [*range(common.derivatives.stop), common.inertia, common.mounting]
+
     def point(self, chosen: Sequence[int], sizes: Array, common: Mapping[int, float] = _FREE) -> Parameters:
         """Parameters where the quadratic is least with these effects alone.
 
@@ -98,7 +105,7 @@ class Expansion:
         wrong_allowed : whether declarations of derivatives may be wrong.
         """
         last, hypothesis, common = self.last, self.last.hypothesis, problem.layout.common
-        declared = [*range(common.derivatives.stop), common.inertia]
+        declared = self.integrated
         at = last.point.common[declared]
         precision = problem.priors(hypothesis).common[np.ix_(declared, declared)]
         gradient, information = self.marginal.gradient.copy(), self.marginal.information.copy()
