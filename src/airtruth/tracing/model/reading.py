@@ -82,7 +82,7 @@ def read(
     that of the declared servo, or a spline (`airtruth.tracing.model.servo_surface`). What a damper moves follows from the
     angular rate that it feeds back (`airtruth.tracing.model.damper`). Airspeed
     and density are inputs, and their noise is not motion: the density is low-passed forward and backward at 5 Hz, and the
-    airspeed where its noise exceeds its gusts, or smoothed (`without_noise`). Other known inputs are low-passed as the density is.
+    airspeed where its noise exceeds its gusts, or smoothed (`without_noise`). The other known inputs are low-passed likewise.
     Attitude is measured, or the integral of the pitch rate from alpha at the start, level flight. In the lateral-directional
     motion an output without an instrument is reconstructed, and the flight is steady where a known input is absent
     (`airtruth.identification.lateral.observation.known_inputs`).
