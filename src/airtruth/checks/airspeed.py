@@ -73,17 +73,18 @@ def _variances(airspeed_m_s: Array) -> tuple[Array, Array]:
     return noise, np.maximum(variance - 2.0 * noise, 0.0)
 
 
-def is_noisy(airspeed_m_s: Array, dt_s: float) -> NDArray[np.bool_]:
-    """Whether a low-pass at `gust_cutoff_hz` leaves noise of more than `_NEGLIGIBLE` of the mean.
+def is_noisy(airspeed_m_s: Array, dt_s: float, negligible: float = _NEGLIGIBLE) -> NDArray[np.bool_]:
+    """Whether a low-pass at `gust_cutoff_hz` leaves noise of more than a share of the mean.
 
     Parameters
     ----------
     airspeed_m_s : (..., samples); dt_s : sample period [s].
+    negligible : the share [-].
     """
     airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
     noise, walk = _variances(airspeed)
     share = np.minimum(1.0, 2.0 * dt_s * _cutoff_hz(noise, walk, dt_s))
-    return np.asarray(np.sqrt(noise * share) > _NEGLIGIBLE * airspeed.mean(axis=-1))
+    return np.asarray(np.sqrt(noise * share) > negligible * airspeed.mean(axis=-1))
 
 
 class WalkInNoise(NamedTuple):
@@ -104,12 +105,16 @@ class QuietAirspeed(NamedTuple):
 
 
 def without_noise(
-    airspeed_m_s: Array, ground_m_s: Array, dt_s: float, ground_walk_m2_s2: float = 0.0
+    airspeed_m_s: Array,
+    ground_m_s: Array,
+    dt_s: float,
+    ground_walk_m2_s2: float = 0.0,
+    negligible: float = _NEGLIGIBLE,
 ) -> QuietAirspeed:
     """Airspeed without the noise of its sensor.
 
-    A low-pass at `gust_cutoff_hz` is enough for most sensors. If it leaves more than a share of `_NEGLIGIBLE`, which changes the
-    lift as a gust does, the result is the speed over ground and the most probable random walk of what the airspeed has beside it.
+    A low-pass at `gust_cutoff_hz` is enough for most sensors. If it leaves more than a negligible share, which changes the forces
+    as a gust does, the result is the speed over ground and the most probable random walk of what the airspeed has beside it.
 
     Parameters
     ----------
@@ -117,9 +122,10 @@ def without_noise(
     dt_s : sample period [s].
     ground_walk_m2_s2 : variance that the error of the speed over ground gains from one sample to the next, as of `ground_walk`;
         the walk has at least that of it.
+    negligible : as of `is_noisy`.
     """
     airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
-    if not is_noisy(airspeed, dt_s):
+    if not is_noisy(airspeed, dt_s, negligible):
         return QuietAirspeed(low_passed(airspeed, dt_s, gust_cutoff_hz(airspeed, dt_s)), None)
     noise = float(_variances(airspeed)[0])
     gust = airspeed - ground_m_s
@@ -169,12 +175,13 @@ def speeds(channels: Mapping[str, Array], dt_s: float, *, banked: bool = False) 
     Parameters
     ----------
     channels : (samples,) each; dt_s : sample period [s].
-    banked : whether sideslip and bank count; otherwise the flight is in the pitch plane.
+    banked : whether sideslip and bank count; otherwise the flight is in the pitch plane. No noise is negligible there: gyros show
+        the moments in calm air, and a turning aircraft averages them over seconds.
     """
-    theta = attitude(channels, dt_s)
+    theta, negligible = attitude(channels, dt_s), 0.0 if banked else _NEGLIGIBLE
     ground = ground_speed(channels, theta, dt_s, banked=banked)
     walk = ground_walk(channels, theta, dt_s, banked=banked)
-    return Speeds(theta, ground, without_noise(channels["airspeed_m_s"], ground, dt_s, walk))
+    return Speeds(theta, ground, without_noise(channels["airspeed_m_s"], ground, dt_s, walk, negligible))
 
 
 def ground_walk(channels: Mapping[str, Array], theta: Array, dt_s: float, *, banked: bool = False) -> float:
