@@ -116,8 +116,8 @@ def turning(x: Array, at: LateralPoint) -> float:
     """beta' without the side force [rad/s]."""
     moved, level = at.ground_m_s * math.cos(x[0]), G0 * math.cos(at.theta_rad)
     return float(
-        x[1] * math.sin(at.ground_alpha_rad)
-        - x[2] * math.cos(at.ground_alpha_rad)
+        x[1] * math.sin(at.ground_attack_rad)
+        - x[2] * math.cos(at.ground_attack_rad)
         + level * math.sin(x[3]) / moved
         - at.speed_rate_1_s * math.tan(x[0])
     )
@@ -295,7 +295,7 @@ def air_at(grid: LateralGrid, point: int) -> LateralPoint:
         ground_m_s=grid.ground_m_s[point],
         qbar_pa=grid.qbar_pa[point],
         alpha_rad=grid.alpha_rad[point],
-        ground_alpha_rad=grid.ground_alpha_rad[point],
+        ground_attack_rad=grid.ground_attack_rad[point],
         theta_rad=grid.theta_rad[point],
         q_rad_s=grid.q_rad_s[point],
         speed_rate_1_s=grid.speed_rate_1_s[point],
@@ -326,7 +326,7 @@ def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
         ground_m_s=at.ground_m_s,
         qbar_pa=at.qbar_pa,
         alpha_rad=at.alpha_rad,
-        ground_alpha_rad=at.ground_alpha_rad,
+        ground_attack_rad=at.ground_attack_rad,
         theta_rad=at.theta_rad,
         q_rad_s=at.q_rad_s,
         speed_rate_1_s=at.speed_rate_1_s,

@@ -61,7 +61,7 @@ class LateralPoint(NamedTuple):
     aileron_rad, rudder_rad : surfaces that the air sees [rad].
     airspeed_m_s, ground_m_s : speed through the air, and without the gust along the path [m/s].
     qbar_pa : dynamic pressure [Pa].
-    alpha_rad, ground_alpha_rad : angle of attack of the air and over ground [rad]; theta_rad : pitch attitude [rad].
+    alpha_rad, ground_attack_rad : angle of attack of the air and over ground [rad]; theta_rad : pitch attitude [rad].
     q_rad_s : pitch rate [rad/s]; speed_rate_1_s : V'/V of the speed without the gust [1/s].
     forward_m_s2, down_m_s2 : specific force along body x and z [m/s2].
     side, roll, yaw : increments of CY, Cl and Cn [-].
@@ -73,7 +73,7 @@ class LateralPoint(NamedTuple):
     ground_m_s: float
     qbar_pa: float
     alpha_rad: float
-    ground_alpha_rad: float
+    ground_attack_rad: float
     theta_rad: float
     q_rad_s: float
     speed_rate_1_s: float
@@ -93,7 +93,7 @@ class LateralGrid(NamedTuple):
     ground_m_s: Array
     qbar_pa: Array
     alpha_rad: Array
-    ground_alpha_rad: Array
+    ground_attack_rad: Array
     theta_rad: Array
     q_rad_s: Array
     speed_rate_1_s: Array
