@@ -16,7 +16,8 @@ r - (v - v_late)/(tau V) with tau = 3 b/(pi V), its roll rate p - p_gust; p_gust
 
 Forces: for each signal a table of Y, L, N over alpha and the signal, times q_bar; constants over alpha; increments of the
 derivatives; terms of `airtruth.physics.terms`. A CG that moves aft takes Y along; one that moves to the right by d leaves the
-other forces at its left, with the moments L = -d m az and N = d m ax of the measured specific forces, which follow the gusts.
+other forces at its left, with the moments L = -d m az and N = d m ax of the measured specific forces, which follow the gusts. A
+normal force that acts farther left by e adds L = -e m az.
 
 Sources: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1; V. Klein and E. A. Morelli,
 Aircraft System Identification, AIAA, 2006, 3.2; gusts, MIL-F-8785C, 3.7.1.2.
@@ -246,12 +247,11 @@ def rates(x: Array, at: LateralPoint, model: FilterModel, out: Array) -> float:
             added = terms(x, own, model.effects, turn == 1, half * force / (mass * moved))
             side, roll, yaw = side + added[0], roll + added[1], yaw + added[2]
     fy += force * side
-    aside = mass * aircraft.cg_y_m
-    fl += force * aircraft.span_m * roll - aside * at.down_m_s2
+    fl += force * aircraft.span_m * roll - mass * aircraft.load_y_m * at.down_m_s2
     fn += (
         force * aircraft.span_m * yaw
         + aircraft.cg_shift * aircraft.chord_m * fy
-        + aside * at.forward_m_s2
+        + mass * aircraft.cg_y_m * at.forward_m_s2
         + aircraft.yaw_moment_n_m
     )
     ixx, iyy = aircraft.inertia_xx_kg_m2, aircraft.inertia_yy_kg_m2

@@ -24,6 +24,7 @@ class LateralAircraft(NamedTuple):
     trim : (signals,) values about which increments of derivatives count [rad, -].
     neutral_rad : (controls,) deflections about which a deflection is scaled [rad]; effectiveness : (controls,) that scale [-].
     cg_shift, cg_y_m : CG aft of the declared one [chords], and to the right of it [m].
+    load_y_m : distance of the CG to the right of the line along which the normal force acts [m].
     yaw_moment_n_m : of an asymmetric thrust, nose right [N m].
     constant : (alpha, 3) Y [N], L and N [N m] that the dynamic pressure leaves alone.
     increments : (15,) of the derivatives, in the order of the motion [-].
@@ -45,6 +46,7 @@ class LateralAircraft(NamedTuple):
     effectiveness: Array
     cg_shift: float
     cg_y_m: float
+    load_y_m: float
     yaw_moment_n_m: float
     constant: Array
     increments: Array

@@ -60,6 +60,7 @@ def pack_lateral(
         effectiveness=np.array([declared[control.name] for control in LATERAL.controls]),
         cg_shift=declared["cg"],
         cg_y_m=declared["cg_y"],
+        load_y_m=declared["cg_y"] + declared["load_y"],
         yaw_moment_n_m=declared["yaw_moment"],
         constant=plant.constant,
         increments=increments,
