@@ -25,13 +25,18 @@ CHEAP = ("gyro_scale",)
 """The only candidate of the trace whose declared aircraft is the damaged one: its errors alone are wanted."""
 
 
-def truth_errors(case: Damage, log: FlightLog, folder: Path, motion: str) -> dict[str, float]:
-    """Free-run errors of the held-out records with the damaged aircraft declared."""
+def truth_errors(
+    case: Damage, log: FlightLog, folder: Path, motion: str | None
+) -> dict[str, dict[str, float]]:
+    """Motion -> free-run errors of the held-out records with the damaged aircraft declared, of the runs that excite it."""
     plane = lateral_aircraft(folder / "truth", case.plane)
-    own = trace([log], plane, TraceOptions(motion=motion, effects=CHEAP)).answer.error.stages["declared"]
-    held = own.held_out or own.fit
-    assert held is not None
-    return held.free_run
+    found = {}
+    for name, own in trace([log], plane, TraceOptions(motion=motion, effects=CHEAP)).motions.items():
+        stage = own.answer.error.stages["declared"]
+        held = stage.held_out or stage.fit
+        assert held is not None
+        found[name] = held.free_run
+    return found
 
 
 def ratio(answer: TraceAnswer, truth: dict[str, float]) -> float:
@@ -61,9 +66,10 @@ def main() -> None:
             folder = Path(text)
             options = TraceOptions(motion=asked.motion, increments=asked.increments)
             result = trace([log], lateral_aircraft(folder / "declared"), options)
+            truth = truth_errors(case, log, folder, asked.motion)
             for motion, own in result.motions.items():
                 right = any(is_reported(own.answer, cause) for cause in case.causes)
-                error = ratio(own.answer, truth_errors(case, log, folder, motion))
+                error = ratio(own.answer, truth[motion])
                 spent = time.process_time() - before
                 print(
                     f"{name} {motion}: {described(own.answer)}; cause reported: {'yes' if right else 'no'}; error "

@@ -69,7 +69,16 @@ def strips(taper, lost, side):
 def test_a_lost_tip_takes_its_strips(side):
     """Roll damping, dihedral effect and aileron of the strips, and the moment of their lift and mass at rest."""
     taper, lost, ends, mass = 0.6, 0.2, (0.55, 0.9), 0.11
-    geometry = SideGeometry(span_m=SPAN_M, taper=taper, aileron=ends, wing_mass=mass, fin_lift=0.0)
+    inertia = GTM.inertia[0], GTM.inertia[2], GTM.inertia[3]
+    geometry = SideGeometry(
+        span_m=SPAN_M,
+        taper=taper,
+        aileron=ends,
+        wing_mass=mass,
+        fin_lift=0.0,
+        inertia_kg_m2=inertia,
+        mass_kg=GTM.mass,
+    )
     y, whole = strips(taper, 0.0, side)
     _, left = strips(taper, lost, side)
     moved = (np.abs(y) > ends[0]) & (np.abs(y) < ends[1])
@@ -84,12 +93,14 @@ def test_a_lost_tip_takes_its_strips(side):
     rest = directions(OWN, TailGeometry(side=geometry), LATERAL)
     name = "right_wing_tip" if side > 0 else "left_wing_tip"
     np.testing.assert_array_equal(rest[name], tip_part(OWN, geometry))
-    # lift of the strips over that of the wing, upward at y: a roll against the lost side's lift
-    rolling = -0.5 * (left * y).sum() / whole.sum()
-    offset = 0.5 * SPAN_M * mass * (left * y).sum() / whole.sum()
-    found = tip_at_rest(geometry)
-    assert side * lost * found["Cl"] == pytest.approx(rolling, rel=2e-3)
-    assert side * lost * found["cg_y"] == pytest.approx(offset, rel=2e-3)
+    # centre of the strips' lift and mass over those of the wing, and their share of the inertias
+    centre = 0.5 * SPAN_M * (left * y).sum() / whole.sum()
+    turned = mass * GTM.mass * (0.5 * SPAN_M) ** 2 * ((left - whole) * y**2).sum() / whole.sum()
+    found = tip_at_rest(geometry, side)
+    assert lost * found["load_y"] == pytest.approx(-centre, rel=2e-3)
+    assert lost * found["cg_y"] == pytest.approx(mass * centre, rel=2e-3)
+    assert lost * found["inertia_xx"] == pytest.approx(turned / inertia[0], rel=2e-3)
+    assert lost * found["inertia_zz"] == pytest.approx(turned / inertia[1], rel=2e-3)
 
 
 def test_the_gtm_without_a_tip():

@@ -96,6 +96,7 @@ def record(y, aileron, rudder, plant_=None, sub=2, dt=DT, name="a", **known):
         control_std_rad=np.zeros(2),
         corner_rad2=np.zeros((2, 0)),
         surface_noise_rad2=np.zeros((2, 0)),
+        assumed=("az_m_s2",),  # known inputs of no flight, whose path is that of the air
     )
     return TraceRecord(signals, plant_ or plant(), LENGTH)
 

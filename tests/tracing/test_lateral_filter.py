@@ -57,6 +57,7 @@ def flown(
     zz=1.0,
     ixz=0.0,
     moved=(0.0, 0.0),
+    loaded=0.0,
     yaw_n_m=0.0,
     surfaces=(aileron, rudder),
     more=lambda s: np.zeros(3),
@@ -67,7 +68,7 @@ def flown(
     """y (samples, 5) and the effects' states by scipy's DOP853: the equations of Stevens and Lewis, table 2.5-1.
 
     ``more``: signals -> increments of CY, Cl, Cn; ``states``: (start, rate by signals and states) of the effects' states;
-    ``moved``: CG aft and to the right [m].
+    ``moved``: CG aft and to the right [m]; ``loaded``: normal force to the left [m].
     """
     c, table = lr.C, np.asarray(derivatives).reshape(3, 5)
     ixx, iyy, izz = c.inertia_xx_kg_m2 * xx, c.inertia_yy_kg_m2, c.inertia_zz_kg_m2 * zz
@@ -96,7 +97,7 @@ def flown(
             cy = (cy + gain * beta_dot(0.0)) / (1.0 - gain * (beta_dot(1.0) - beta_dot(0.0)))
         rate = beta_dot(cy)
         cn += cn_beta_dot * rate * half
-        roll = force * c.span_m * cl - moved[1] * m * SMOOTH["az"](t)
+        roll = force * c.span_m * cl - (moved[1] + loaded) * m * SMOOTH["az"](t)
         yaw = force * c.span_m * cn + moved[0] * force * cy + moved[1] * m * SMOOTH["ax"](t) + yaw_n_m
         roll += cross * p * q - (izz - iyy) * q * r
         yaw -= cross * q * r + (iyy - ixx) * p * q
@@ -146,6 +147,7 @@ CHANGES = {
     "inertia_xz": (DeclaredTerm("inertia_xz", 0.05), {"ixz": 0.05}),
     "cg": (DeclaredTerm("cg", 0.1), {"moved": (0.1 * lr.C.chord_m, 0.0)}),
     "cg_y": (DeclaredTerm("cg_y", 0.02), {"moved": (0.0, 0.02)}),
+    "load_y": (DeclaredTerm("load_y", 0.02), {"loaded": 0.02}),
     "yaw_moment": (DeclaredTerm("yaw_moment", 2.0), {"yaw_n_m": 2.0}),
     "aileron": (
         DeclaredTerm("aileron", 0.8),

@@ -12,6 +12,7 @@ from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing import TraceOptions
 from airtruth.tracing.run import trace
+from validation import damage as damaged
 from validation.lateral_declared import lateral_aircraft
 from validation.lateral_truth import GTM, log_of, record_pair, with_effect
 
@@ -80,6 +81,17 @@ def test_a_weak_fin_is_named(tmp_path):
     answer = trace([log_of(*weak)], lateral_aircraft(tmp_path / "gtm"), LATERAL).answer
     assert not answer.declared_model.consistent
     assert any("fin_effectiveness" in s.effects for s in answer.alternatives)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("case", "key"), [("tip-20", "wing_tip_loss"), ("cg-side-3", "cg_shift_y")])
+def test_an_asymmetric_aircraft_has_one_cause_that_predicts_other_records(tmp_path, case, key):
+    """Both roll the aircraft with its lift, which follows the gusts; the yaw of the CG tells them apart."""
+    log = log_of(*damaged.flights(damaged.CASES[case], seed=7)[:4])
+    answer = trace([log], lateral_aircraft(tmp_path / "gtm"), LATERAL, out=tmp_path / "traced").answer
+    assert [e.key for e in answer.effects] == [key]
+    assert answer.confirmed
+    assert answer.updated_aircraft is not None
 
 
 @pytest.mark.slow

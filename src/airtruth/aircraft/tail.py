@@ -27,7 +27,7 @@ def tail_geometry(aircraft: Aircraft) -> TailGeometry:
 
 def _side_geometry(aircraft: Aircraft, aspect_ratio: float | None) -> SideGeometry:
     c, fin, wing = aircraft.constants, aircraft.file.fin, aircraft.file.wing
-    result = SideGeometry(span_m=c.span_m)
+    result = SideGeometry(span_m=c.span_m, mass_kg=c.mass_kg)
     if aspect_ratio is not None:
         result = replace(result, aspect_ratio=aspect_ratio)
     if c.inertia_xx_kg_m2 > 0.0 and c.inertia_zz_kg_m2 > 0.0:

@@ -16,7 +16,7 @@ from airtruth.effects.increment import NAME as INCREMENT
 from airtruth.effects.registry import EFFECTS, named
 from airtruth.errors import ConfigurationError
 from airtruth.physics.motion import MOTIONS, Motion
-from airtruth.physics.resolution import LinearPoint, resolved
+from airtruth.physics.resolution import LinearPoint
 from airtruth.tracing.answer import AcceptedEffect, TraceAnswer
 from airtruth.tracing.inference.causes import DERIVATIVES
 
@@ -206,16 +206,7 @@ def _spread(effect: Effect, sizes: Array) -> Array:
 
 def at_point(hypothesised: Hypothesised, point: LinearPoint) -> Hypothesised:
     """The hypothesis with a cause of changed derivatives resolved into terms about a trim."""
-    effect = hypothesised.effect
-    if not effect.in_derivatives:
-        return hypothesised
-    describe = effect.describe
-    return replace(
-        hypothesised,
-        effect=replace(
-            effect, describe=lambda values: resolved(describe(values), point), in_derivatives=False
-        ),
-    )
+    return replace(hypothesised, effect=hypothesised.effect.at_point(point))
 
 
 __all__ = [

@@ -11,6 +11,7 @@ from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.composition import PARTS
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.physics.terms import LATE, Change, coefficients_of
 from airtruth.quantity import LARGEST
 from airtruth.units import UNITS, printed
@@ -265,6 +266,18 @@ class Effect:
         known = motion.names | set(coefficients_of(motion))
         of_motion = all(PARTS[name].motion == motion.name for name in parts)
         return shown and names - parts <= known and of_motion
+
+    @property
+    def acts_at_rest(self) -> bool:
+        """Whether a part that it changes adds forces beside the derivatives, which the filter has to carry."""
+        return any(t.cause in PARTS and PARTS[t.cause].at_rest is not None for t in self._example.derivatives)
+
+    def at_point(self, point: LinearPoint) -> Effect:
+        """The effect with its causes of changed derivatives as terms about a trim; the same one where it has none."""
+        if not self.in_derivatives:
+            return self
+        describe = self.describe
+        return replace(self, describe=lambda values: resolved(describe(values), point), in_derivatives=False)
 
     @property
     def motions(self) -> tuple[str, ...]:

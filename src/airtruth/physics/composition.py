@@ -123,8 +123,8 @@ class Part:
     neutral : value that changes nothing: 1 of a factor, 0 of a shift or of a severity.
     direction : derivatives of the motion and geometry -> change of the derivatives per unit, at the neutral value.
     motion : name of the motion whose derivatives they are.
-    at_rest : geometry -> what it adds per unit beside the derivatives: a coefficient per lift coefficient of the aircraft
-        [-], or a declared quantity [its unit]; None for nothing.
+    at_rest : geometry -> declared quantities that it changes per unit beside the derivatives [their units; relative changes of
+        factors]; None for nothing.
     """
 
     neutral: float
@@ -142,7 +142,7 @@ def _tip(derivatives: Array, geometry: TailGeometry) -> Array:
 
 
 def _without_left_tip(geometry: TailGeometry) -> Mapping[str, float]:
-    return {name: -value for name, value in tip_at_rest(geometry.side).items()}
+    return tip_at_rest(geometry.side, -1.0)
 
 
 def _without_right_tip(geometry: TailGeometry) -> Mapping[str, float]:

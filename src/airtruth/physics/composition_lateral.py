@@ -42,7 +42,7 @@ class SideGeometry:
     fin_arm, fin_height : distance of the fin's aerodynamic centre behind and above the CG over the span [-].
     fin_lift : lift slope of the fin by the wing area and the free dynamic pressure [1/rad].
     rudder_on_fin : whether the rudder is a part of the fin.
-    inertia_kg_m2 : Ixx, Izz, Ixz [kg m2].
+    inertia_kg_m2 : Ixx, Izz, Ixz [kg m2]; mass_kg : mass of the aircraft [kg], 0 where it is not declared.
     """
 
     span_m: float = 0.0
@@ -55,6 +55,7 @@ class SideGeometry:
     fin_lift: float | None = None
     rudder_on_fin: bool = True
     inertia_kg_m2: tuple[float, float, float] | None = None
+    mass_kg: float = 0.0
 
 
 def fin_part(derivatives: Array, geometry: SideGeometry) -> Array:
@@ -119,30 +120,32 @@ def tip_part(derivatives: Array, geometry: SideGeometry) -> Array:
     return np.asarray(part / _REFERENCE_LOSS)
 
 
-def tip_at_rest(geometry: SideGeometry) -> Mapping[str, float]:
-    """Increments of a lost right wing tip at rest, per semispan lost.
+def tip_at_rest(geometry: SideGeometry, side: float = 1.0) -> Mapping[str, float]:
+    """Declared quantities that a lost wing tip changes beside the derivatives, per semispan lost.
+
+    Parameters
+    ----------
+    side : 1 for the right tip, -1 for the left one.
 
     Returns
     -------
-    "Cl" : rolling moment per lift coefficient of the aircraft, right wing down [-]; "cg_y" : CG to the right [m].
+    "cg_y" : CG to the right [m]; "load_y" : centre of the lift to the left [m]; "inertia_xx", "inertia_zz" : relative changes,
+    where mass and inertias are declared [-]. Lift and mass of a strip are in proportion to its chord.
     """
-    outboard = 1.0 - _REFERENCE_LOSS
-    area = 0.5 * _strips(geometry, outboard, 1.0, 0) / _strips(geometry, 0.0, 1.0, 0)
-    at = _strips(geometry, outboard, 1.0, 1) / _strips(geometry, outboard, 1.0, 0)
-    rolling, cg = 0.5 * area * at, -0.5 * geometry.span_m * geometry.wing_mass * area * at
-    return {"Cl": rolling / _REFERENCE_LOSS, "cg_y": cg / _REFERENCE_LOSS}
-
-
-def lift_slope(geometry: SideGeometry) -> float:
-    """Lift slope of the wing by its aspect ratio [1/rad] (H. B. Helmbold, 1942; straight wing, section slope of 2 pi).
-
-    Examples
-    --------
-    >>> round(lift_slope(SideGeometry(aspect_ratio=8.0)), 3)
-    4.906
-    """
-    ratio = geometry.aspect_ratio
-    return 2.0 * np.pi * ratio / (2.0 + float(np.hypot(2.0, ratio)))
+    arm, square = (
+        0.5 * _strips(geometry, 1.0 - _REFERENCE_LOSS, 1.0, power) / _strips(geometry, 0.0, 1.0, 0)
+        for power in (1, 2)
+    )
+    half = 0.5 * geometry.span_m
+    turned = geometry.wing_mass * geometry.mass_kg * half**2 * square
+    xx, zz, _ = geometry.inertia_kg_m2 or (np.inf, np.inf, 0.0)
+    found = {
+        "cg_y": -side * half * arm * geometry.wing_mass,
+        "load_y": side * half * arm,
+        "inertia_xx": -turned / xx,
+        "inertia_zz": -turned / zz,
+    }
+    return {name: amount / _REFERENCE_LOSS for name, amount in found.items()}
 
 
 def inertia_parts(derivatives: Array, geometry: SideGeometry) -> dict[str, Array]:
@@ -201,4 +204,4 @@ def _strips(geometry: SideGeometry, first: float, last: float, power: int) -> fl
     return ends[1] - ends[0]
 
 
-__all__ = ["SideGeometry", "cg_part", "fin_part", "inertia_parts", "lift_slope", "tip_at_rest", "tip_part"]
+__all__ = ["SideGeometry", "cg_part", "fin_part", "inertia_parts", "tip_at_rest", "tip_part"]

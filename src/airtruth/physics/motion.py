@@ -340,6 +340,7 @@ LATERAL: Final = Motion(
         Declared("inertia_xz", entry="inertia_xz"),
         Declared("cg", entry="cg"),
         Declared("cg_y"),
+        Declared("load_y"),
         Declared("yaw_moment"),
     ),
     modes=(

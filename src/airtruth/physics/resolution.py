@@ -1,7 +1,7 @@
 """Causes of a change of the derivatives, as linear terms about a trim.
 
 The increments are first order (`airtruth.physics.composition`): several causes add. Forces and moments stay as they are at
-the trim, whose own change by the cause is left out; a lost wing tip alone states what it adds at rest.
+the trim, whose own change by the cause is left out; a lost wing tip alone states what it changes at rest.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.composition import CAUSES, PARTS, TailGeometry, cause_motion, directions
-from airtruth.physics.composition_lateral import lift_slope
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, DeclaredTerm, DerivativeTerm
 
@@ -31,21 +30,12 @@ class LinearPoint:
     trim : signal of the motion, or alpha -> value at the trim [rad]; those left out are zero there.
     geometry : what is declared of wing, tail and fin.
     motion : the motion of the model.
-    weight : weight over the dynamic pressure and the wing area at the trim, its lift coefficient [-].
     """
 
     derivatives: Array
     trim: Mapping[str, float]
     geometry: TailGeometry
     motion: Motion = LONGITUDINAL
-    weight: float = 0.0
-
-    def at_rest(self, coefficient: str, amount: float) -> AeroTerm:
-        """An increment of ``amount`` per lift coefficient, with the lift linear in the angle of attack."""
-        slope = lift_slope(self.geometry.side)
-        return AeroTerm(
-            coefficient, "alpha", "linear", amount * slope, self.trim.get("alpha", 0.0) - self.weight / slope
-        )
 
 
 def derivative_increments(
@@ -115,24 +105,16 @@ def _resolved(causes: tuple[DerivativeTerm, ...], at: LinearPoint) -> Change:
     for coefficient in (c.name for c in motion.coefficients if c.sign < 0):
         amounts[motion.row(coefficient)] /= np.cos(at.trim[motion.implicit[1]])
     named = {name: float(x) for name, x in zip(motion.parameters, amounts, strict=True) if x != 0.0}
-    resting = tuple(_at_rest(causes, at))
-    return Change(
-        aero=(
-            *linear_terms(named, at.trim, motion),
-            *(t for t in resting if isinstance(t, AeroTerm)),
-        ),
-        declared=tuple(t for t in resting if isinstance(t, DeclaredTerm)),
-    )
+    return Change(aero=linear_terms(named, at.trim, motion), declared=tuple(_at_rest(causes, at)))
 
 
-def _at_rest(causes: Iterable[DerivativeTerm], at: LinearPoint) -> Iterator[AeroTerm | DeclaredTerm]:
-    """Increments of parts beside the derivatives."""
+def _at_rest(causes: Iterable[DerivativeTerm], at: LinearPoint) -> Iterator[DeclaredTerm]:
+    """Declared quantities that parts change beside the derivatives."""
     for term in causes:
         part = PARTS.get(term.cause)
         if part is not None and part.at_rest is not None:
             for name, amount in part.at_rest(at.geometry).items():
-                added = (term.value - part.neutral) * amount
-                yield DeclaredTerm(name, added) if name in DECLARED else at.at_rest(name, added)
+                yield DeclaredTerm(name, DECLARED[name] + (term.value - part.neutral) * amount)
 
 
 def linear_terms(

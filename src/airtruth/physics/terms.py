@@ -247,9 +247,9 @@ class DeclaredTerm:
     ----------
     quantity : key of `DECLARED`. "mass", "inertia" (Iyy), "inertia_xx", "inertia_zz", the name of a control (all forces and
         moments of the surface's deflection from trim): a factor, neutral 1. "inertia_xz": increment of Ixz over the square
-        root of Ixx Izz; "cg": shift of the CG aft [chords]; "cg_y": to the right [m]; "thrust_arm": shift of the thrust
-        line down, nose-up positive [m]; "yaw_moment": constant yawing moment, nose right [N m]: neutral 0. Sensors keep
-        their position relative to the CG; a `SensorTerm` moves them.
+        root of Ixx Izz; "cg": shift of the CG aft [chords]; "cg_y": to the right [m]; "load_y": shift of the normal force to the
+        left [m]; "thrust_arm": shift of the thrust line down, nose-up positive [m]; "yaw_moment": constant yawing moment, nose
+        right [N m]: neutral 0. Sensors keep their position relative to the CG; a `SensorTerm` moves them.
     """
 
     quantity: str

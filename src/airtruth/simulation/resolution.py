@@ -14,7 +14,6 @@ from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import Linearisation, linearise
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
-from airtruth.units import G0
 
 
 def trimmed_and_linear(
@@ -70,10 +69,7 @@ def linear_point(
         **{c.name: at.surfaces_rad[c.name] for c in LATERAL.controls},
         **{s.name: getattr(at, s.channel) for s in LATERAL.known_signals},
     }
-    force = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * aircraft.wing_area_m2
-    return LinearPoint(
-        linear.central, trimmed, tail_geometry(aircraft), LATERAL, weight=at.mass_kg * G0 / force
-    )
+    return LinearPoint(linear.central, trimmed, tail_geometry(aircraft), LATERAL)
 
 
 def point_of(aircraft: Aircraft, at: Trim, linear: Linearisation) -> LinearPoint:

@@ -15,11 +15,13 @@ from airtruth.aircraft import Aircraft, Sensor
 from airtruth.aircraft.tail import tail_geometry
 from airtruth.checks.excitation import LEAST_ELEVATOR_RAD
 from airtruth.effects.effect import Effect
+from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError, LogError, choices
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.reconstruction import is_reconstructed
+from airtruth.physics.resolution import LinearPoint
 from airtruth.tracing.conditions import condition_notes, flies, records_of, with_mean_derivatives
 from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses, causes_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
@@ -132,7 +134,8 @@ def prepare(
     mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
     slopes = dict(zip(motion.parameters, mean.tolist(), strict=True))
     foreign = [e for e in effects if not e.applies_to(motion) or _delays_input(e, motion)]
-    effects = [effect.for_aircraft(slopes) for effect in effects if effect not in foreign]
+    point = LinearPoint(mean, fitted[0].plant.trims, tail_geometry(aircraft), motion)
+    effects = [e.for_aircraft(slopes).at_point(point) for e in effects if e not in foreign]
     columns = set.intersection(*(set(log.channels) for log in logs))
     reasons = {effect.key: _why_not(effect, columns, absent) for effect in effects}
     untestable = [(e, reasons[e.key]) for e in effects if reasons[e.key]]
@@ -151,7 +154,7 @@ def prepare(
         untestable=tuple(untestable),
         model=model,
         notes=tuple(notes),
-        declared=_declared_causes(fitted, aircraft, options, motion),
+        declared=_declared_causes(point, options, {e.key for e in effects}),
     )
 
 
@@ -190,18 +193,16 @@ def _unmeasured(channel: str, motion: Motion) -> str:
     )
 
 
-def _declared_causes(
-    fitted: Sequence[TraceRecord],
-    aircraft: Aircraft,
-    options: TraceOptions,
-    motion: Motion,
-) -> DeclaredCauses:
-    """Causes that move several derivatives, and wrong declarations, as far as they are requested."""
-    mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
+def _declared_causes(point: LinearPoint, options: TraceOptions, in_filter: Collection[str]) -> DeclaredCauses:
+    """Causes that move several derivatives, and wrong declarations, as far as they are requested.
+
+    What acts at rest too is an effect of the filter.
+    """
     keys = options.keys
-    causes = causes_of(directions(mean, tail_geometry(aircraft), motion))
+    causes = causes_of(directions(point.derivatives, point.geometry, point.motion))
+    own = (c for c in causes if not (c.key in in_filter and EFFECTS[c.key].acts_at_rest))
     return DeclaredCauses(
-        tuple(c for c in causes if keys is None or c.key in keys),
+        tuple(c for c in own if keys is None or c.key in keys),
         keys is None or DERIVATIVES in keys,
     )
 

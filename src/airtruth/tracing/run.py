@@ -209,7 +209,7 @@ def _effects(options: TraceOptions) -> list[Effect]:
     motion = options.motion or LONGITUDINAL.name
     library = {key: effect for key, effect in EFFECTS.items() if motion in (effect.motions or (motion,))}
     if options.effects is None:
-        return [effect for effect in library.values() if not effect.in_derivatives]
+        return [effect for effect in library.values() if _is_in_filter(effect)]
     found: dict[str, Effect] = {}
     for key in options.effects:
         if isinstance(key, Effect):
@@ -219,8 +219,12 @@ def _effects(options: TraceOptions) -> list[Effect]:
         if not matching:
             known = {*library, *(e.name for e in library.values())}
             raise ConfigurationError(f"effect {key!r}: {choices(key, known)}")
-        found |= {k: e for k, e in matching.items() if not e.in_derivatives}
+        found |= {k: e for k, e in matching.items() if _is_in_filter(e)}
     return list(found.values())
+
+
+def _is_in_filter(effect: Effect) -> bool:
+    return not effect.in_derivatives or effect.acts_at_rest
 
 
 __all__ = ["Begun", "Write", "answered", "begun", "provenance_of", "trace"]

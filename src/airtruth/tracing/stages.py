@@ -12,7 +12,7 @@ from airtruth.tracing.inference.assess import Assessment, assess, fitted_noise_f
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.settings import Settings
+from airtruth.tracing.model.settings import Settings, initial_per_record
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.candidate import Candidate
 from airtruth.tracing.selection.rounds import SearchRound
@@ -108,8 +108,15 @@ def _model(fit: PosteriorFit) -> StageModel:
 
 
 def _assess_all(problem: TraceProblem, model: StageModel, fitted: bool) -> list[Assessment]:
+    """Assess each record; held-out ones begin at the mean trim of the fitted ones, which an effect at rest has moved."""
+    trim = problem.layout.per_record.trim
+
     def one(index: int) -> Assessment:
-        own = model.per_record[index] if fitted else None
+        if fitted:
+            own = model.per_record[index]
+        else:
+            own = initial_per_record(problem.records[index], problem.settings)
+            own[trim] = model.per_record[:, trim].mean(axis=0)
         settled = fitted and model.fitted
         return assess(problem, index, model.hypothesis, model.common, model.sizes, own, settled=settled)
 

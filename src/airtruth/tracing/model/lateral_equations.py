@@ -16,7 +16,8 @@ r - (v - v_late)/(tau V) with tau = 3 b/(pi V), its roll rate p - p_gust; p_gust
 
 Forces: for each signal a table of Y, L, N over alpha and the signal, times q_bar; constants over alpha; increments of the
 derivatives; terms of `airtruth.physics.terms`. A CG that moves aft takes Y along; one that moves to the right by d leaves the
-other forces at its left, with the moments L = -d m az and N = d m ax of the measured specific forces, which follow the gusts.
+other forces at its left, with the moments L = -d m az and N = d m ax of the measured specific forces, which follow the gusts. A
+normal force that acts farther left by e adds L = -e m az.
 
 Sources: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1; V. Klein and E. A. Morelli,
 Aircraft System Identification, AIAA, 2006, 3.2; gusts, MIL-F-8785C, 3.7.1.2.
@@ -116,8 +117,8 @@ def turning(x: Array, at: LateralPoint) -> float:
     """beta' without the side force [rad/s]."""
     moved, level = at.ground_m_s * math.cos(x[0]), G0 * math.cos(at.theta_rad)
     return float(
-        x[1] * math.sin(at.ground_alpha_rad)
-        - x[2] * math.cos(at.ground_alpha_rad)
+        x[1] * math.sin(at.ground_attack_rad)
+        - x[2] * math.cos(at.ground_attack_rad)
         + level * math.sin(x[3]) / moved
         - at.speed_rate_1_s * math.tan(x[0])
     )
@@ -246,12 +247,11 @@ def rates(x: Array, at: LateralPoint, model: FilterModel, out: Array) -> float:
             added = terms(x, own, model.effects, turn == 1, half * force / (mass * moved))
             side, roll, yaw = side + added[0], roll + added[1], yaw + added[2]
     fy += force * side
-    aside = mass * aircraft.cg_y_m
-    fl += force * aircraft.span_m * roll - aside * at.down_m_s2
+    fl += force * aircraft.span_m * roll - mass * aircraft.load_y_m * at.down_m_s2
     fn += (
         force * aircraft.span_m * yaw
         + aircraft.cg_shift * aircraft.chord_m * fy
-        + aside * at.forward_m_s2
+        + mass * aircraft.cg_y_m * at.forward_m_s2
         + aircraft.yaw_moment_n_m
     )
     ixx, iyy = aircraft.inertia_xx_kg_m2, aircraft.inertia_yy_kg_m2
@@ -295,7 +295,7 @@ def air_at(grid: LateralGrid, point: int) -> LateralPoint:
         ground_m_s=grid.ground_m_s[point],
         qbar_pa=grid.qbar_pa[point],
         alpha_rad=grid.alpha_rad[point],
-        ground_alpha_rad=grid.ground_alpha_rad[point],
+        ground_attack_rad=grid.ground_attack_rad[point],
         theta_rad=grid.theta_rad[point],
         q_rad_s=grid.q_rad_s[point],
         speed_rate_1_s=grid.speed_rate_1_s[point],
@@ -326,7 +326,7 @@ def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
         ground_m_s=at.ground_m_s,
         qbar_pa=at.qbar_pa,
         alpha_rad=at.alpha_rad,
-        ground_alpha_rad=at.ground_alpha_rad,
+        ground_attack_rad=at.ground_attack_rad,
         theta_rad=at.theta_rad,
         q_rad_s=at.q_rad_s,
         speed_rate_1_s=at.speed_rate_1_s,

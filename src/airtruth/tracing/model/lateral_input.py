@@ -24,6 +24,7 @@ class LateralAircraft(NamedTuple):
     trim : (signals,) values about which increments of derivatives count [rad, -].
     neutral_rad : (controls,) deflections about which a deflection is scaled [rad]; effectiveness : (controls,) that scale [-].
     cg_shift, cg_y_m : CG aft of the declared one [chords], and to the right of it [m].
+    load_y_m : distance of the CG to the right of the line along which the normal force acts [m].
     yaw_moment_n_m : of an asymmetric thrust, nose right [N m].
     constant : (alpha, 3) Y [N], L and N [N m] that the dynamic pressure leaves alone.
     increments : (15,) of the derivatives, in the order of the motion [-].
@@ -45,6 +46,7 @@ class LateralAircraft(NamedTuple):
     effectiveness: Array
     cg_shift: float
     cg_y_m: float
+    load_y_m: float
     yaw_moment_n_m: float
     constant: Array
     increments: Array
@@ -61,7 +63,7 @@ class LateralPoint(NamedTuple):
     aileron_rad, rudder_rad : surfaces that the air sees [rad].
     airspeed_m_s, ground_m_s : speed through the air, and without the gust along the path [m/s].
     qbar_pa : dynamic pressure [Pa].
-    alpha_rad, ground_alpha_rad : angle of attack of the air and over ground [rad]; theta_rad : pitch attitude [rad].
+    alpha_rad, ground_attack_rad : angle of attack of the air and over ground [rad]; theta_rad : pitch attitude [rad].
     q_rad_s : pitch rate [rad/s]; speed_rate_1_s : V'/V of the speed without the gust [1/s].
     forward_m_s2, down_m_s2 : specific force along body x and z [m/s2].
     side, roll, yaw : increments of CY, Cl and Cn [-].
@@ -73,7 +75,7 @@ class LateralPoint(NamedTuple):
     ground_m_s: float
     qbar_pa: float
     alpha_rad: float
-    ground_alpha_rad: float
+    ground_attack_rad: float
     theta_rad: float
     q_rad_s: float
     speed_rate_1_s: float
@@ -93,7 +95,7 @@ class LateralGrid(NamedTuple):
     ground_m_s: Array
     qbar_pa: Array
     alpha_rad: Array
-    ground_alpha_rad: Array
+    ground_attack_rad: Array
     theta_rad: Array
     q_rad_s: Array
     speed_rate_1_s: Array

@@ -21,8 +21,12 @@ from airtruth.tracing.model.parameters import CommonEntries
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import Signals
 from airtruth.tracing.model.records import fine as on_grid
+from airtruth.units import G0
 
 Array = NDArray[np.float64]
+
+_STEPS: Final = 4
+"""Steps that give the first climb [-] (judgement: each reduces its error by the square of the bank)."""
 
 register(LateralAircraft, LateralGrid, EQUATIONS)
 
@@ -56,6 +60,7 @@ def pack_lateral(
         effectiveness=np.array([declared[control.name] for control in LATERAL.controls]),
         cg_shift=declared["cg"],
         cg_y_m=declared["cg_y"],
+        load_y_m=declared["cg_y"] + declared["load_y"],
         yaw_moment_n_m=declared["yaw_moment"],
         constant=plant.constant,
         increments=increments,
@@ -83,6 +88,34 @@ def _angle_of_attack(compiled: CompiledChange, s: Signals) -> Array:
     return errors.unscaled(s.alpha_rad) - roll * errors.y_m / s.airspeed_m_s
 
 
+def _over_ground(alpha_rad: Array, ground_m_s: Array, theta_rad: Array, s: Signals) -> Array:
+    """Angle of attack over ground, from the climb that the specific forces give, with the mean of the one of the air [rad].
+
+    The gusts that the vane reads do not turn the path of the aircraft. The mean gust of the record remains unknown; it is a
+    parameter of the record (`airtruth.tracing.model.parameters.RecordEntries.upwash`).
+
+    Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1 (h').
+    """
+    if {"alpha_rad", "theta_rad", "az_m_s2"} & {*s.assumed}:
+        return alpha_rad
+    outputs = dict(zip((y.name for y in s.motion.outputs), s.y.T, strict=True))
+    beta, phi, ay = (on_grid(outputs[name], s.sub) for name in ("beta", "phi", "ay"))
+    sine, cosine = np.sin(theta_rad), np.cos(theta_rad)
+    upward = s.ax_m_s2 * sine - cosine * (ay * np.sin(phi) + s.az_m_s2 * np.cos(phi)) - G0
+    climb = np.concatenate([[0.0], np.cumsum(0.5 * s.dt_s / s.sub * (upward[1:] + upward[:-1]))])
+
+    def attack(first_m_s: float) -> Array:
+        # sin(gamma) = sin(theta) cos(alpha) cos(beta) - cos(theta) (sin(phi) sin(beta) + cos(phi) sin(alpha) cos(beta))
+        along, across = sine * np.cos(beta), cosine * np.cos(phi) * np.cos(beta)
+        rest = (climb + first_m_s) / ground_m_s + cosine * np.sin(phi) * np.sin(beta)
+        return np.asarray(np.arctan2(along, across) - np.arcsin(rest / np.hypot(along, across)))
+
+    first = 0.0
+    for _ in range(_STEPS):
+        first += float(ground_m_s.mean() * (attack(first) - alpha_rad).mean())
+    return attack(first)
+
+
 def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
     """V'/V of the speed without the gust, from its samples [1/s]."""
     sampled = ground_m_s[:: s.sub]
@@ -93,7 +126,8 @@ def _known(s: Signals, compiled: CompiledChange, air: AirPath) -> Sequence[Array
     """Known inputs of `LateralGrid`."""
     alpha, q = _angle_of_attack(compiled, s), compiled.undone("q_rad_s", s.q_rad_s)
     v, ground, qbar, theta = air
-    return v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s), s.ax_m_s2, s.az_m_s2
+    turned = _over_ground(alpha, ground, theta, s)
+    return v, ground, qbar, alpha, turned, theta, q, _relative_rate(ground, s), s.ax_m_s2, s.az_m_s2
 
 
 PACKING: Final = Packing(LateralGrid, _known, pack_lateral, side_gusts)

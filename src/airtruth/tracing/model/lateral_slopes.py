@@ -175,8 +175,8 @@ def _turning(
     """Derivatives of beta' into ``row``, where the side force is ``fy`` in all and has the derivatives ``d_fy``."""
     mass, along = model.aircraft.mass_kg, at.ground_m_s * math.cos(x[0])
     sine, cosine, level = (
-        math.sin(at.ground_alpha_rad),
-        math.cos(at.ground_alpha_rad),
+        math.sin(at.ground_attack_rad),
+        math.cos(at.ground_attack_rad),
         G0 * math.cos(at.theta_rad),
     )
     by_roll, by_force, tangent = level * math.cos(x[3]) / along, 1.0 / (mass * along), math.tan(x[0])

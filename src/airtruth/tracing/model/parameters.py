@@ -138,11 +138,10 @@ class RecordEntries(Entries):
     ----------
     motion_start : initial values of the states [their units].
     gusts : initial states of the gust's filter [-]; start : motion and gusts.
-    bias : of each output [its unit].
-    trim : increments of the coefficients at the trim [-].
-    offsets : biases and trim.
+    bias : of each output [its unit]; trim : increments of the coefficients at the trim [-]; offsets : both.
     log_gust : logarithm of the standard deviation of the gust [m/s].
-    deterministic : all but the gusts (indices): initial states, biases, trim.
+    upwash : mean angle of a vertical gust [rad], where the angle of attack is a known input.
+    deterministic : all but the gusts (indices): initial states, biases, trim, upwash.
     """
 
     def __init__(self, motion: Motion) -> None:
@@ -155,6 +154,7 @@ class RecordEntries(Entries):
                 *(FreeEntry(f"bias_{y.name}", unit := _unit(y.channel), _STEPS[unit]) for y in outputs),
                 *(FreeEntry(f"{c.name}0", "-", 1e-5 if c.length is None else 1e-6) for c in coefficients),
                 FreeEntry(f"log_sigma_{gust}", "-", 1e-4),
+                *(FreeEntry("upwash", "rad", 1e-4) for _ in motion.known_signals),
             ]
         )
         self.motion_start = slice(0, len(states))
@@ -164,7 +164,8 @@ class RecordEntries(Entries):
         self.trim = slice(self.bias.stop, self.bias.stop + len(coefficients))
         self.offsets = slice(self.bias.start, self.trim.stop)
         self.log_gust = self.index(f"log_sigma_{gust}")
-        self.deterministic = np.r_[self.motion_start, self.offsets]
+        self.upwash = slice(self.log_gust + 1, self.size)
+        self.deterministic = np.r_[self.motion_start, self.offsets, self.upwash]
 
 
 def _unit(channel: str) -> str:

@@ -276,11 +276,13 @@ def kernel_input(
         more[given.lead :] = external.output
         for row, own in zip(force.values(), external.force, strict=True):
             row[-own.size :] += own
+    upwash = per_record[settings.layout.per_record.upwash]
+    turned = {} if not upwash.size else {"ground_attack_rad": given.grid.ground_attack_rad + upwash}
     signals = given.record.signals
     return KernelInput(
         y=given.y,
         more=more,
-        grid=given.grid._replace(**force),
+        grid=given.grid._replace(**force, **turned),
         corner_rad2=given.corner_rad2,
         dt_s=signals.dt_s,
         sub=signals.sub,

@@ -74,14 +74,16 @@ class _Noise(NamedTuple):
 def _sloped(kernel: KernelInput, settings: Settings, common: Array, wanted: Ints) -> Ints:
     """The parameters that have derivatives along the nominal flight.
 
-    Correlated noise that is absent adds states once it is there, and a play has no slope where it reverses.
+    Correlated noise that is absent adds states once it is there, a play has no slope where it reverses, and no motion states that
+    in the upwash.
     """
     model = kernel.model
     if not has_slopes(model) or (model.effects.state_index[:, 0] == PLAY).any():
         return wanted[:0]
     shares = settings.layout.common.colour_shares
     absent = np.arange(shares.start, shares.stop)[common[shares] <= 0.0]
-    return wanted[~np.isin(wanted, absent)]
+    upwash = common.size + np.arange(settings.layout.per_record.size)[settings.layout.per_record.upwash]
+    return wanted[~np.isin(wanted, [*absent, *upwash])]
 
 
 def respond_with_slopes(

@@ -1,0 +1,46 @@
+"""The angle of attack over ground of a lateral record follows from specific forces and attitude, not from a gust on the vane."""
+
+from dataclasses import replace
+
+import lateral_records as lr
+import numpy as np
+
+from airtruth.physics.motion import LATERAL
+from airtruth.physics.terms import Change
+from airtruth.tracing.model.reading import read
+from airtruth.tracing.model.records import TraceRecord
+from airtruth.tracing.model.response import filter_inputs, kernel_input
+from airtruth.units import DEG
+from validation.lateral_truth import Flight, log_of
+
+FLIGHT = Flight(duration_s=10.0, seed=3).quiet()
+GUST = 0.6 * DEG
+
+
+def record_in_gusts(leave_out=()):
+    """A calm flight whose vane reads a gust besides, and the angle of attack over ground."""
+    log = log_of(FLIGHT, leave_out=leave_out)
+    alpha = log.channels["alpha_rad"]
+    read_angle = alpha + GUST * np.sin(2.0 * log.t_s)
+    log = replace(log, channels=log.channels | {"alpha_rad": read_angle})
+    return TraceRecord(read(log, LATERAL)[0], lr.plant(), lr.LENGTH), alpha, read_angle
+
+
+def test_the_path_has_the_mean_of_the_vane_and_none_of_its_gusts():
+    record, alpha, read_angle = record_in_gusts()
+    found = filter_inputs(record, Change()).grid.ground_attack_rad[:: record.signals.sub]
+    np.testing.assert_allclose(found - alpha, (read_angle - alpha).mean(), atol=0.02 * DEG)
+
+
+def test_without_attitude_the_path_is_that_of_the_air():
+    record, _, _ = record_in_gusts(leave_out=("theta_rad",))
+    grid = filter_inputs(record, Change()).grid
+    np.testing.assert_array_equal(grid.ground_attack_rad, grid.alpha_rad)
+
+
+def test_the_upwash_of_a_record_turns_its_path():
+    record, _, _ = record_in_gusts()
+    given = filter_inputs(record, Change())
+    own = lr.per_record(upwash=0.01)
+    turned = kernel_input(given, lr.SETTINGS, lr.common(), own).grid.ground_attack_rad
+    np.testing.assert_allclose(turned - given.grid.ground_attack_rad, 0.01)
