@@ -1,4 +1,4 @@
-"""The functions of a change in a JSBSim model: surfaces, increments of coefficients, and a constant yawing moment."""
+"""The functions of a change in a JSBSim model: surfaces, increments of coefficients, and moments of declared quantities."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, SubElement
 from airtruth.aircraft.jsbsim import aerodynamics as aerodynamics_xml
 from airtruth.aircraft.jsbsim import surface as surface_xml
 from airtruth.aircraft.jsbsim.axes import axis
-from airtruth.aircraft.jsbsim.functions import function, value
+from airtruth.aircraft.jsbsim.functions import function, op, value
 from airtruth.aircraft.model import JsbsimModel, SurfaceProperties
 from airtruth.aircraft.origin import Origin
 from airtruth.errors import AircraftError
@@ -20,6 +20,8 @@ _CONTROLS: Final = tuple(c.name for m in MOTIONS.values() for c in m.controls)
 """Controls of every motion."""
 _TURNING: Final = "yaw_moment"
 """Declared quantity of a constant yawing moment [N m]."""
+_LOADED: Final = "load_y"
+"""Declared quantity of a normal force that acts to the left [m]."""
 
 
 def write(
@@ -45,8 +47,8 @@ def write(
     """
     factors = {name: declared_total(change.declared, name) for name in _CONTROLS}
     moved = {n for n in _CONTROLS if change.of_surface(n) or factors[n] != 1.0}
-    turning = declared_total(change.declared, _TURNING)
-    if not moved and not change.aero and not turning:
+    turning, loaded = (declared_total(change.declared, name) for name in (_TURNING, _LOADED))
+    if not (moved or change.aero or turning or loaded):
         return
     aerodynamics = root.find("aerodynamics")
     if aerodynamics is None:
@@ -73,8 +75,12 @@ def write(
         components += aerodynamics_xml.write(
             aerodynamics, change.aero, change.states, surfaces, gusts, origin, where
         )
+    label = surfaces[_CONTROLS[0]].names.label
+    if loaded:
+        words = f"Roll by a normal force {loaded!r} m to the left [lbf ft]{origin.of_declared(_LOADED)}"
+        formula = op("product", -loaded / FT, "forces/fbz-aero-lbs")
+        axis(aerodynamics, "ROLL").append(function(f"aero/{label}/load-roll-lbsft", words, formula))
     if turning:
-        label = surfaces[_CONTROLS[0]].names.label
         words = f"Constant yawing moment, nose right [lbf ft]: {turning!r} N m{origin.of_declared(_TURNING)}"
         added = function(f"aero/{label}/yaw-moment-lbsft", words, value(turning / (LBF * FT)))
         axis(aerodynamics, "YAW").append(added)

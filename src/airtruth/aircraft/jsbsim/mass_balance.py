@@ -66,9 +66,7 @@ def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Masses, where: s
     balance = root.find("mass_balance")
     shift, mass = declared_total(terms, "cg"), declared_total(terms, "mass")
     inertia, arm = declared_total(terms, "inertia"), declared_total(terms, "thrust_arm")
-    cross = declared_total(terms, "inertia_xz")
-    # a normal force to the left rolls as a CG to the right does; the yaw of that CG is small
-    aside = declared_total(terms, "cg_y") + declared_total(terms, "load_y")
+    aside, cross = declared_total(terms, "cg_y"), declared_total(terms, "inertia_xz")
     roll, yaw = declared_total(terms, "inertia_xx"), declared_total(terms, "inertia_zz")
     if balance is None:
         if shift or aside or cross or {mass, inertia, roll, yaw} != {1.0}:
