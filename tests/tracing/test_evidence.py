@@ -61,12 +61,12 @@ def test_a_wrong_declaration_is_a_wider_prior():
     q, y, a = linear()
     found = [w for w in q.sets(1) if w.declaration.wrong == (1,) and not w.columns]
     assert len(found) == len(CRITERION.wrong_by)
-    odds = np.exp(CRITERION.log_wrong)
-    every = 2.0 * odds + odds**2  # either of two derivatives, or both
+    further = np.exp(CRITERION.log_same_event)
+    every = 2.0 * further + further**2  # either of two derivatives, or both
     for w, by in zip(found, CRITERION.wrong_by, strict=True):
         exact = log_density(y, a[:, :2], np.diag([0.3, 0.5 * by]) ** 2)
         assert w.log_evidence == pytest.approx(
-            exact + 2.0 * CRITERION.log_wrong - np.log(2.0 * every), abs=1e-8
+            exact + CRITERION.log_wrong + CRITERION.log_same_event - np.log(2.0 * every), abs=1e-8
         )
         assert q.names(w) == (DERIVATIVES,)
 

@@ -161,7 +161,7 @@ class Prior:
     shape : relative uncertainty of each element of its direction [-]; the default is of one that follows from definitions,
         second order in the size (judgement).
     log_odds : logarithm of its prior odds [-]; the default is of a usual cause, one in 150 (judgement: nothing missing then has a
-        prior probability of 0.6; with one in 55, the weights of right sets in blind trials of one effect were too low by 0.16).
+        prior probability of two in three; one in 55 made the weights of right sets in blind trials too low by 0.16).
     """
 
     std: float

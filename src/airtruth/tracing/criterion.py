@@ -34,9 +34,10 @@ class AnswerCriterion:
     wrong_by : standard deviation of a derivative whose declaration is wrong, over the declared one [-]: equal parts of a
         mixture (judgement: published uncertainties of derivatives are often too small by the first factor, and by up to the
         second).
-    log_wrong : logarithm of the prior odds of all sets of wrong declarations together, whatever the number of derivatives, and of
-        each further wrong one [-] (judgement).
-    log_same_event : logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three).
+    log_wrong : logarithm of the prior odds of all sets of wrong declarations together, whatever the number of derivatives [-]
+        (judgement: one in seven).
+    log_same_event : logarithm of the prior odds of each further cause of the same event, and of each further wrong derivative [-]
+        (judgement: one in three).
     far : standard deviations that count as far [-] (convention): a free run of records left out that gets worse by more
         refuses a set, and a cause whose size is as many standard deviations of its prior is provisional.
     slight : overshoot allowed to an effect that cancels a declared term, as a fraction of that term [-] (judgement: a flight
@@ -56,7 +57,7 @@ class AnswerCriterion:
     simpler: float = 0.3
     even: float = 0.5
     wrong_by: tuple[float, float] = (3.0, 10.0)
-    log_wrong: float = -1.0
+    log_wrong: float = -2.0
     log_same_event: float = -1.0
     far: float = 3.0
     slight: float = 0.25

@@ -269,9 +269,10 @@ class Quadratic:
         at = list(wrong)
         spread[at, at] = (by**2 - 1.0) * np.diag(self.declared)[at]
         every = np.log(
-            len(CRITERION.wrong_by) * ((1.0 + np.exp(CRITERION.log_wrong)) ** self.derivatives - 1.0)
+            len(CRITERION.wrong_by) * ((1.0 + np.exp(CRITERION.log_same_event)) ** self.derivatives - 1.0)
         )
-        return Declaration(wrong, spread, CRITERION.log_wrong * (1 + len(wrong)) - float(every))
+        further = CRITERION.log_same_event * len(wrong)
+        return Declaration(wrong, spread, CRITERION.log_wrong + further - float(every))
 
     def _singly(
         self, declarations: Sequence[Declaration], most: int
