@@ -95,7 +95,7 @@ def _side() -> _Kind:
     signals, controls = np.zeros(len(motion.signals)), np.zeros(len(motion.controls))
     table = np.zeros((signals.size, 2, 2, forces))
     points = np.tile(_AXIS, (signals.size, 1))
-    about = [signals, controls, controls, 0.0, 0.0, 0.0, table[0, 0], increments]
+    about = [signals, controls, controls, *[0.0] * 4, table[0, 0], increments]
     aircraft = LateralAircraft._make([*[1.0] * 8, *about, _AXIS, points, table])
     moves = LateralMoves(1.0, increments, 0.0, states, states)
     return _Kind(motion, aircraft, LateralPoint, LateralGrid, moves)
