@@ -149,7 +149,7 @@ class _BestFirst:
         if not self.sets.count_kinematics(self.temper):
             return False
         least = self._best().weighed.log_evidence + float(np.log(CRITERION.level))
-        near = [k for k in self._fits if max(p.weighed.log_evidence for p in self._of_fit(k)) > least]
+        near = [k for k in self._fits if any(p.weighed.log_evidence > least for p in self._of_fit(k))]
         changed = [key for key in near if self.sets.counts_kinematics(key)]
         for key in changed:
             for last in [expansion.last for expansion in self._fits.pop(key)]:
