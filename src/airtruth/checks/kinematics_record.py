@@ -199,6 +199,11 @@ class InstrumentError:
         return KINDS[self.kind].neutral
 
     @property
+    def is_factor(self) -> bool:
+        """Whether it multiplies the reading, and a declared error too."""
+        return KINDS[self.kind].is_factor
+
+    @property
     def is_arm(self) -> bool:
         """Whether it is a distance."""
         return KINDS[self.kind].dimension == "length"

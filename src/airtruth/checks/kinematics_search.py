@@ -232,8 +232,8 @@ def _grow(
     """Fit the sets of a layer with the further errors that promise most, and add them to those that are known."""
     for one in layer:
         errors = dict(zip(one.names, one.value, strict=True))
-        moments = problem.moments(errors)
-        slopes = [problem.slope(n, errors, moments) for n in one.names]
+        moments, rows = problem.linearised(one.names, errors)
+        slopes = list(rows)
         promises: dict[frozenset[str], tuple[float, int]] = {}
         for i, hints in enumerate(more):
             names = frozenset(h.name for h in hints)

@@ -298,7 +298,7 @@ def _candidates(
 
 def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -> Derivatives:
     """Declared and refitted derivatives at the trim, the mean over the records' flight conditions."""
-    declared = np.mean([r.plant.derivatives for r in case.fitted.records], axis=0)
+    declared = case.fitted.declared_derivatives
     motion = case.fitted.layout.motion
 
     def named(values: Array) -> dict[str, float]:

@@ -25,7 +25,6 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LONGITUDINAL, Motion
-from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import Evidence, TraceAnswer
 from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.kinematic_likelihood import KinematicLikelihood
@@ -155,7 +154,7 @@ def _beyond_declared(one: Finding) -> float:
 
     A bias is no error of `ERRORS`: the check estimates it beside them.
     """
-    is_factor = one.name in ERRORS and KINDS[ERRORS[one.name].kind].is_factor
+    is_factor = one.name in ERRORS and ERRORS[one.name].is_factor
     return one.value / one.declared if is_factor else one.value - one.declared
 
 

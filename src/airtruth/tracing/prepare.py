@@ -28,7 +28,13 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.reading import measured_controls, read
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine
-from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
+from airtruth.tracing.model.settings import (
+    VANE,
+    declared_change,
+    declared_derivatives_of,
+    resolved,
+    settings_of,
+)
 from airtruth.tracing.model.surface_noise import with_surface_noise
 from airtruth.tracing.options import TraceOptions
 from airtruth.units import DEG
@@ -131,7 +137,7 @@ def prepare(
     if not held:
         notes.append("nothing is held out: the verdict is provisional")
     notes.extend(_NO_VANE if channel == VANE else _unmeasured(channel, motion) for channel in absent)
-    mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
+    mean = declared_derivatives_of(fitted)
     slopes = dict(zip(motion.parameters, mean.tolist(), strict=True))
     foreign = [e for e in effects if not e.applies_to(motion) or _delays_input(e, motion)]
     point = LinearPoint(mean, fitted[0].plant.trims, tail_geometry(aircraft), motion)

@@ -99,7 +99,7 @@ def _modes(stages: Stages) -> dict[str, dict[str, float | None]]:
     if problem.layout.motion is not LATERAL:
         return {}
     records = problem.records
-    declared = np.mean([r.plant.derivatives for r in records], axis=0)
+    declared = problem.declared_derivatives
     means = (
         [r.signals.airspeed_m_s for r in records],
         [r.signals.density_kg_m3 for r in records],

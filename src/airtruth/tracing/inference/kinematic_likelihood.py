@@ -20,12 +20,14 @@ from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_search import ErrorSearch
 from airtruth.effects.effect import Effect
-from airtruth.physics.sensor_errors import KINDS
+from airtruth.numerics.kept import Kept
 
 Array = NDArray[np.float64]
 
 _KEPT: Final = 256
-"""Number of points whose values are kept [-] (judgement: more than the evaluations of a refit)."""
+"""Number of points that are kept of a check [-] (judgement: more than the evaluations of a refit)."""
+_LINEARISED: Final = Kept[dict[tuple[tuple[str, float], ...], tuple[Array, Array]]]()
+"""Search of a check -> m and its derivatives by the errors of sensors."""
 
 
 class KinematicTerms(NamedTuple):
@@ -80,25 +82,16 @@ class KinematicLikelihood:
 
     def _at(self, sizes: Mapping[str, float]) -> tuple[Array, Array]:
         """m (components,) at some sizes, and (sizes, components) its derivatives."""
-        key = tuple(sizes.items())
-        if key not in self._known:
-            errors = {**self._others, **{name: self._error(name, size) for name, size in sizes.items()}}
-            along, slopes = self.search.problem.linearised(list(sizes), errors)
-            if len(self._known) >= _KEPT:
-                self._known.clear()
-            self._known[key] = along, slopes * np.array([[self._per_size(name)] for name in sizes])
-        return self._known[key]
-
-    def _error(self, name: str, size: float) -> float:
-        """Error at a size, which adds to the declared error or multiplies it."""
-        declared = self.search.problem.start(name)
-        return declared * (1.0 + size) if self._is_factor(name) else declared + size
-
-    def _per_size(self, name: str) -> float:
-        return self.search.problem.start(name) if self._is_factor(name) else 1.0
-
-    def _is_factor(self, name: str) -> bool:
-        return KINDS[self.search.problem.kinematics.errors[name].kind].is_factor
+        known = _LINEARISED.of(self.search)
+        if known is None or len(known) >= _KEPT:
+            known = _LINEARISED.keep(self.search, {})
+        problem, key = self.search.problem, tuple(sizes.items())
+        if key not in known:
+            factors = {n: problem.start(n) for n in sizes if problem.kinematics.errors[n].is_factor}
+            errors = {n: factors[n] * (1.0 + x) if n in factors else problem.start(n) + x for n, x in key}
+            along, slopes = problem.linearised(list(sizes), {**self._others, **errors})
+            known[key] = along, slopes * np.array([[factors.get(n, 1.0)] for n in sizes])
+        return known[key]
 
     @cached_property
     def _others(self) -> dict[str, float]:
@@ -109,10 +102,6 @@ class KinematicLikelihood:
     @cached_property
     def _none(self) -> Array:
         return self.search.problem.linearised((), self._others)[0]
-
-    @cached_property
-    def _known(self) -> dict[tuple[tuple[str, float], ...], tuple[Array, Array]]:
-        return {}
 
 
 __all__ = ["KinematicLikelihood", "KinematicTerms"]

@@ -243,7 +243,7 @@ def per_record_prior(
 
 
 def declared_derivatives_of(records: Sequence[TraceRecord]) -> Array:
-    """(6,) declared derivatives, averaged over the records' flight conditions [-]."""
+    """(derivatives,) declared values, averaged over the records' flight conditions [-]."""
     return np.asarray(np.mean([r.plant.derivatives for r in records], axis=0))
 
 

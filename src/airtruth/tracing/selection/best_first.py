@@ -102,7 +102,7 @@ class _BestFirst:
         for sizes in known:
             self._begin_at(sizes)
         self._tempered(self._best().expansion.last)
-        self._recounted()
+        self._reweighed()
         as_declared = self._as_declared()
         if as_declared is not None:
             self._expansions.append(expanded(self.sets.problem, as_declared, self.effects))
@@ -126,7 +126,7 @@ class _BestFirst:
                 self._refused.append(fitted)
                 continue
             if following is None or self.refits >= limit:
-                if self._recounted():
+                if self._reweighed():
                     continue
                 if swept or not self._is_misfit(fitted):
                     break
@@ -144,13 +144,13 @@ class _BestFirst:
         }
         return Posterior(normalised(logs), evaluated, fits, null, self.refits, self.temper, self.is_sound)
 
-    def _recounted(self) -> bool:
-        """Count the kinematics beside the present ratio of variances; whether fits were made again for it."""
-        if not self.sets.count_kinematics(self.temper):
+    def _reweighed(self) -> bool:
+        """Weigh the kinematics by the present ratio of variances; whether fits were made again for it."""
+        if not self.sets.weigh_kinematics(self.temper):
             return False
         least = self._best().weighed.log_evidence + float(np.log(CRITERION.level))
         near = [k for k in self._fits if any(p.weighed.log_evidence > least for p in self._of_fit(k))]
-        changed = [key for key in near if self.sets.counts_kinematics(key)]
+        changed = [key for key in near if self.sets.holds_sensor_error(key)]
         for key in changed:
             for last in [expansion.last for expansion in self._fits.pop(key)]:
                 self._enter(self.sets.converged(last.hypothesis, last.point, near=last))

@@ -120,15 +120,15 @@ class SetTable:
                 break
         return own
 
-    def counts_kinematics(self, keys: Collection[str]) -> bool:
-        """Whether the kinematics tells of any of some effects."""
+    def holds_sensor_error(self, keys: Collection[str]) -> bool:
+        """Whether any of some effects is an error of a sensor that the kinematics shows."""
         told = self.problem.kinematics
         return told is not None and told.shows(keys)
 
-    def count_kinematics(self, temper: float) -> bool:
-        """Count what the kinematics tells beside a likelihood that is divided by a ratio of variances; whether that changes it.
+    def weigh_kinematics(self, temper: float) -> bool:
+        """Set the weight of the likelihood of the kinematics by a ratio of variances; whether it has changed.
 
-        The fits that hold an error of the kinematics leave the table: they were made with another count.
+        The fits with an error of a sensor that the kinematics shows leave the table, because they were made with the old weight.
 
         Parameters
         ----------
@@ -138,8 +138,8 @@ class SetTable:
         if told is None or abs(np.log(temper / told.temper)) < SAME:
             return False
         self.problem = replace(self.problem, kinematics=replace(told, temper=temper))
-        self._best = {k: f for k, f in self._best.items() if not self.counts_kinematics(k.keys)}
-        self._tried = {at for at in self._tried if not self.counts_kinematics(at[0].keys)}
+        self._best = {k: f for k, f in self._best.items() if not self.holds_sensor_error(k.keys)}
+        self._tried = {at for at in self._tried if not self.holds_sensor_error(at[0].keys)}
         return True
 
     def keep(self, fitted: PosteriorFit) -> None:
