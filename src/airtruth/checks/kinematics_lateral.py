@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from airtruth.checks.kinematics_energy import by_equation
 from airtruth.checks.kinematics_findings import bias_of, concluded, drift, errors_of
@@ -93,7 +93,7 @@ def _searched(problem: KinematicProblem, usual: Mapping[str, float]) -> tuple[Er
         left = {}
         for equation, (energy, count) in by_equation(found.problem, found.best.fit).items():
             whole = energy * enlarged.get(equation, 1.0) ** 2 / max(count, 1)
-            if fisher.sf(whole, max(count, 1), found.problem.weight.degrees) < DOUBT:
+            if fdtrc(max(count, 1), found.problem.weight.degrees, whole) < DOUBT:
                 left[equation] = float(np.sqrt(whole))
         if left.keys() == enlarged.keys() and all(abs(left[e] / enlarged[e] - 1.0) < STEADY for e in left):
             break

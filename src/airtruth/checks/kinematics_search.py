@@ -15,8 +15,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
-from scipy.stats import t as student
+from scipy.special import fdtrc, stdtrit
 
 from airtruth.checks.kinematics_energy import absolute
 from airtruth.checks.kinematics_fit import Fit, KinematicProblem, fit, problem_of
@@ -145,7 +144,7 @@ def search(problem: KinematicProblem, usual: Mapping[str, float]) -> ErrorSearch
         margin=scale.margin,
         statistic=statistic,
         degrees=degrees,
-        p_value=float(fisher.sf(statistic / max(degrees, 1), max(degrees, 1), _noise_degrees(problem))),
+        p_value=float(fdtrc(max(degrees, 1), _noise_degrees(problem), statistic / max(degrees, 1))),
         stable=stable,
     )
 
@@ -156,7 +155,7 @@ def _noise_degrees(problem: KinematicProblem) -> float:
 
 def price(problem: KinematicProblem) -> float:
     """Price of a further error: the squared quantile of Student's distribution at `FALSE`."""
-    return float(student.isf(0.5 * FALSE, problem.weight.degrees) ** 2)
+    return float(stdtrit(problem.weight.degrees, 0.5 * FALSE) ** 2)
 
 
 @dataclass(frozen=True)
@@ -317,7 +316,7 @@ def _costs(problem: KinematicProblem, fits: Sequence[Fit], usual: Mapping[str, f
 def _inexact(probability: float, degrees: int, count: int) -> float:
     """Gain of 2 log likelihood at the best noise level that noise exceeds with a probability: that of an F test."""
     degrees = max(degrees, 1)
-    return float(count * np.log1p(student.isf(0.5 * probability, degrees) ** 2 / degrees))
+    return float(count * np.log1p(stdtrit(degrees, 0.5 * probability) ** 2 / degrees))
 
 
 def _scale(problem: KinematicProblem, fits: Sequence[Fit], usual: Mapping[str, float]) -> tuple[_Scale, bool]:
@@ -331,9 +330,9 @@ def _scale(problem: KinematicProblem, fits: Sequence[Fit], usual: Mapping[str, f
     by_noise, by_rest = (_costs(problem, fits, usual, exact) for exact in (True, False))
     best = fits[int(np.argmin(by_noise))]
     left = max(problem.weight.span.shape[1] - len(best.names), 1)
-    doubtful = fisher.sf(best.statistic / left, left, _noise_degrees(problem)) < DOUBT
+    doubtful = fdtrc(left, _noise_degrees(problem), best.statistic / left) < DOUBT
     if not doubtful or by_noise.min() <= by_rest.min():
-        return _Scale(1.0, float(student.isf(0.5 * EQUAL, problem.weight.degrees) ** 2)), True
+        return _Scale(1.0, float(stdtrit(problem.weight.degrees, 0.5 * EQUAL) ** 2)), True
     chosen = fits[int(np.argmin(by_rest))]
     degrees = max(problem.weight.span.shape[1] - len(chosen.names), 1)
     factor = max(chosen.statistic / degrees, 1.0)

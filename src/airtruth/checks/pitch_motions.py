@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from airtruth.checks.samples import integral, lagged
 from airtruth.numerics.prefilter import butterworth, zero_phase
+from airtruth.numerics.recursion import low_pass
 from airtruth.numerics.srivc import simulate, srivc
 
 Array = NDArray[np.float64]
@@ -52,8 +52,7 @@ def pitch_motions(elevator_rad: Array, q_rad_s: Array, dt_s: float) -> Array:
     if not np.isfinite(model.a).all():
         rows = [smooth]
         for corner in _BANK_HZ:
-            pole = np.exp(-2.0 * np.pi * corner * dt)
-            rows.append(lfilter([1.0 - pole], [1.0, -pole], smooth))
+            rows.append(low_pass(float(np.exp(-2.0 * np.pi * corner * dt)), smooth))
         return np.array(rows)
     q = simulate(model, elevator, dt, "foh")[0]
     unit = 1.0 / np.sqrt(max(float(model.a[0, 1]), 1e-6))

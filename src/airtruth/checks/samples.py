@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
+from airtruth.numerics.recursion import recursion
+
 Array = NDArray[np.float64]
 
 _INTEGRAL: Final = np.array([11.0, -93.0, 802.0, 802.0, -93.0, 11.0]) / 1440.0
@@ -87,8 +89,6 @@ def lagged(x: Array, dt_s: float, lag_s: float) -> Array:
     """
     if lag_s <= 0.0:
         return x
-    from scipy.signal import lfilter  # slow to import, and few channels lag
-
     slope = derivative(x, dt_s)
     rise = np.diff(x) / dt_s
     left, right = slope[..., :-1], slope[..., 1:]
@@ -97,7 +97,7 @@ def lagged(x: Array, dt_s: float, lag_s: float) -> Array:
     at_left = x[..., :-1] - lag_s * (left - lag_s * (curve - lag_s * cubic))
     at_right = x[..., 1:] - lag_s * (right - lag_s * (curve + cubic * dt_s - lag_s * cubic))
     decay = math.exp(-dt_s / lag_s)
-    y, _ = lfilter([1.0], [1.0, -decay], at_right - decay * at_left, zi=decay * x[..., :1])
+    y = recursion(decay, at_right - decay * at_left, x[..., 0])
     return np.concatenate([x[..., :1], y], axis=-1)
 
 

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_banded
+
+from airtruth.numerics.recursion import low_pass
 
 Array = NDArray[np.float64]
 
@@ -81,10 +82,8 @@ def instruments(elevator: Array, dt_s: float) -> Array:
     moved = elevator - elevator[..., :1]
     rows = []
     for lag in LAGS_S:
-        pole = np.exp(-dt_s / lag)
-        # y[k] - pole y[k - 1] = (1 - pole) x[k] as a bidiagonal system: scipy.signal takes longer to import than a check
-        band = np.repeat([[1.0], [-pole]], moved.shape[-1], axis=1)
-        rows.append(solve_banded((1, 0), band, (1.0 - pole) * moved.T, check_finite=False).T)
+        pole = float(np.exp(-dt_s / lag))
+        rows.append(low_pass(pole, moved))
     return spectrum(np.stack(rows, axis=-2), dt_s)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
 from airtruth.design.separation import Member
@@ -89,7 +89,7 @@ def split_probability(sigma: float) -> float:
     >>> round(split_probability(6.0**0.5), 2)
     0.5
     """
-    return float(norm.sf((_TIE - sigma**2) / (2.0 * sigma))) if sigma > 0.0 else 0.0
+    return float(ndtr((sigma**2 - _TIE) / (2.0 * sigma))) if sigma > 0.0 else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

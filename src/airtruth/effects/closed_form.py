@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class ClosedForm:
     @property
     def p_value(self) -> float:
         """Probability of a larger residual where the form is right [-]."""
-        return float(chi2.sf(self.statistic, max(self.degrees, 1)))
+        return float(chdtrc(max(self.degrees, 1), self.statistic))
 
     @property
     def is_as_good(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from airtruth.effects.increment import Increment
 from airtruth.physics.atmosphere import RHO0_KG_M3
@@ -72,7 +72,7 @@ Publish = Callable[[bool], tuple[str | None, Replay | None]]
 
 _TRACEABLE: Final = 4.0
 """Root of the noncentrality from which an effect counts as traceable [-] (judgement: after Holm's correction at 5 %
-over 33 candidates such an effect is significant in four of five flights, as norm.cdf(4 - norm.isf(0.05/66)) = 0.80)."""
+over 33 candidates such an effect is significant in four of five flights, as ndtr(4 + ndtri(0.05/66)) = 0.80)."""
 
 
 def conclude(
@@ -248,9 +248,9 @@ def _p_value(own: SearchRound, best: Candidate) -> float:
         return best.score.p_value
     keys = [s.effect.key for s in own.table.scores]
     if best.score.effect.key not in keys:
-        return len(own.adjusted) * float(chi2.sf(max(best.gain, 0.0), 1))
+        return len(own.adjusted) * float(chdtrc(1, max(best.gain, 0.0)))
     index = keys.index(best.score.effect.key)
-    ratio = len(own.adjusted) * float(chi2.sf(max(best.gain, 0.0), 1))
+    ratio = len(own.adjusted) * float(chdtrc(1, max(best.gain, 0.0)))
     return min(float(own.adjusted[index]), ratio)
 
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2, norm
+from scipy.special import chdtrc, chdtri, chndtr, ndtri
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.answer import (
@@ -248,7 +248,7 @@ def cause_scores(
     rows = []
     for key, (size, std) in sizes.items():
         z = size / std if std > 0.0 else 0.0
-        alone = float(chi2.sf(z**2, 1))
+        alone = float(chdtrc(1, z**2))
         rows.append(_row(key, z**2, alone, len(declared.causes), named, rejected, z))
     if declared.wrong_allowed:
         test = first.declared_test
@@ -295,13 +295,15 @@ def traceable_errors(directions: int, derivatives: int = 0) -> float:
     derivatives : number of single derivatives that are tested, for a cause that is one of them; 0 for others.
     """
     level = 0.25 * CRITERION.declared
-    threshold = chi2.isf(level, directions)
-    power = brentq(lambda noncentrality: ncx2.sf(threshold, directions, noncentrality) - _POWER, 1.0, 1e3)
+    threshold = chdtri(directions, level)
+    power = brentq(
+        lambda noncentrality: 1.0 - chndtr(threshold, directions, noncentrality) - _POWER, 1.0, 1e3
+    )
     joint = math.sqrt(float(power))
     if not derivatives:
         return joint
     each = -math.expm1(math.log1p(-level) / derivatives)
-    return min(joint, float(norm.isf(0.5 * each) + norm.isf(1.0 - _POWER)))
+    return min(joint, float(ndtri(_POWER) - ndtri(0.5 * each)))
 
 
 def _row(

@@ -19,7 +19,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.anomalies.significance import significant_gain
@@ -126,7 +126,7 @@ def _with_one_size(
         return own, None
     first, second = told[0], told[1]
     statistic = (first.size - second.size) ** 2 / (first.std**2 + second.std**2)
-    p_value = float(chi2.sf(statistic, 1))
+    p_value = float(chdtrc(1, statistic))
     others = (_with_prior(own[0], key, second), _with_prior(own[1], key, first))
     cause = SharedCause(
         effect=next(e for e in own[0].case.effects if e.key == key),

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from airtruth.numerics.recursion import low_pass, recursion
 from airtruth.physics.motion import Motion
 from airtruth.tracing.inference.derivative_likelihood import DERIVATIVES_MOVED
 from airtruth.tracing.model.records import fine
@@ -103,10 +103,11 @@ def _response(view: View, to: Destinations, control: int) -> Series:
     Laguerre functions show memory, the squares of the deflection and of its first filter show curvature.
     """
     de = view.controls_rad[control] / view.largest_rad[control]
-    pole = np.exp(-_POLE_RAD_S * view.dt_s / view.sub)
-    basis = [lfilter([1.0 - pole], [1.0, -pole], de)]
+    pole = float(np.exp(-_POLE_RAD_S * view.dt_s / view.sub))
+    basis = [low_pass(pole, de)]
     for _ in range(_BASIS - 1):
-        basis.append(lfilter([-pole, 1.0], [1.0, -pole], basis[-1]))
+        delayed = np.append(0.0, basis[-1][:-1])
+        basis.append(recursion(pole, delayed - pole * basis[-1]))
     basis += [de**2, basis[0] ** 2]
     return [
         (where, b if to.output(where) is None else b[:: view.sub])

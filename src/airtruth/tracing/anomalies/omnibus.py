@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from airtruth.numerics.kept import Kept
+from airtruth.numerics.recursion import low_pass
 from airtruth.physics.motion import Motion
 from airtruth.tracing.anomalies.families import Destinations, Series, View, families
 from airtruth.tracing.anomalies.spectrum import lines
@@ -99,7 +99,7 @@ def chi_square(gradient: Array, information: Array) -> tuple[float, int, float]:
     kept = values > _DISTINCT * values.max()
     amounts = (vectors.T @ (gradient / scale))[kept] / np.sqrt(values[kept])
     statistic, degrees = float(amounts @ amounts), int(kept.sum())
-    return statistic, degrees, float(chi2.sf(statistic, degrees))
+    return statistic, degrees, float(chdtrc(degrees, statistic))
 
 
 def views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
@@ -157,7 +157,7 @@ def _from_others(without_vane: Response, vane: int) -> Array:
 
 def _rate(x: Array, dt_s: float) -> Array:
     pole = np.exp(-dt_s / _MEMORY_S)
-    smooth = lfilter([1.0 - pole], [1.0, -pole], x - x[0])
+    smooth = low_pass(float(pole), x - x[0])
     return np.asarray(np.diff(smooth, prepend=0.0) / dt_s)
 
 

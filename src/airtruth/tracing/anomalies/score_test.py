@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from airtruth.effects.effect import Effect
 from airtruth.numerics.kept import Kept
@@ -249,7 +249,7 @@ def holm(p_values: Sequence[float]) -> Array:
 
 def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.random.Generator) -> float:
     top = z[best] if one_sided else abs(z[best])
-    single = float(norm.sf(top) if one_sided else 2.0 * norm.sf(top))
+    single = float(ndtr(-top) if one_sided else 2.0 * ndtr(-top))
     if z.size == 1:
         return single
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -260,7 +260,7 @@ def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.r
     largest = draws.max(axis=1) if one_sided else np.abs(draws).max(axis=1)
     # beyond the resolution of the draws: the effective number of independent locations, from a level within it
     level = float(np.quantile(largest, _RESOLVED))
-    count = (1.0 - _RESOLVED) / float(norm.sf(level) if one_sided else 2.0 * norm.sf(level))
+    count = (1.0 - _RESOLVED) / float(ndtr(-level) if one_sided else 2.0 * ndtr(-level))
     if top > level:
         return min(1.0, max(1.0, count) * single)
     return float((np.count_nonzero(largest >= top) + 1) / (_DRAWS + 1))

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from airtruth.tracing.anomalies.score_test import ScoreTable
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
@@ -27,7 +27,7 @@ def significant_gain(candidates: int, level: float = FAMILY_LEVEL) -> float:
     ----------
     level : significance level over all candidates [-].
     """
-    return float(chi2.isf(level / max(candidates, 1), 1))
+    return float(chdtri(1, level / max(candidates, 1)))
 
 
 def strongest(

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 
@@ -52,7 +52,7 @@ def lines(residuals: Sequence[Array], dt_s: Sequence[float], channels: Sequence[
     if not seen.any():
         return HypothesisTest(channels[0], 0.0, 1, 1.0)
     p = np.ones_like(power)
-    p[seen] = chi2.sf(power[seen], degrees[seen][:, None])
+    p[seen] = chdtrc(degrees[seen][:, None], power[seen])
     excess = np.sqrt(2.0 * power) - np.sqrt(2.0 * degrees)[:, None]
     # among p-values that underflow to zero, the band with the most power
     b, channel = divmod(int(np.lexsort((-excess.ravel(), p.ravel()))[0]), p.shape[1])

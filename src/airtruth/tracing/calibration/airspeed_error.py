@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from airtruth.numerics.local_level import error_variances
 from airtruth.tracing.inference.direction import inserted, projected
@@ -112,7 +112,7 @@ def _most_probable(
     gradient, information = projected(null, problem, sensitivities, NO_WHITENER)
     scaled = information * np.outer(stds, stds) + np.eye(len(stds))
     amounts = -np.linalg.solve(scaled, stds * gradient)
-    limit = float(chi2.ppf(_PLAUSIBLE, len(stds)))
+    limit = float(chdtri(len(stds), 1.0 - _PLAUSIBLE))
     amounts *= min(1.0, math.sqrt(limit / max(float(amounts @ amounts), 1e-30)))
     return np.split(stds * amounts, spans[1:-1])
 

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.optimise import fit, initial_parameters
@@ -68,7 +68,7 @@ def later_level(samples: int, outputs: int) -> float:
     ----------
     samples : of all fitted records; outputs : number of outputs.
     """
-    level = outputs * float(norm.sf(_LATER * TYPICAL * np.sqrt(samples)))
+    level = outputs * float(ndtr(-(_LATER * TYPICAL * np.sqrt(samples))))
     return min(max(level, LEVEL), LATER_LEVEL)
 
 
@@ -86,7 +86,7 @@ def beside(case: Case, null: PosteriorFit, level: float = LEVEL) -> tuple[Case, 
     settings = replace(problem.settings, coloured=True)
     slow = replace(problem, settings=settings)
     z = scores(slow, null)
-    if not (norm.sf(z) < level / len(z)).any():
+    if not (ndtr(-z) < level / len(z)).any():
         return case, null.point
     common = null.point.common.copy()
     common[slow.layout.common.colour_shares] = np.where(z > 0.0, FIRST_SHARE, 0.0)

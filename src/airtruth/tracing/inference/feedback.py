@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def _responds(surface_rad: Sequence[Array], whitened: Sequence[Array]) -> bool:
     after = _residual(np.hstack([past, shocks])[usual], following[usual])
     left = float(after @ after)
     ratio = (float(before @ before) - left) / shocks.shape[1] / (left / freedom)
-    return bool(f_distribution.sf(ratio, shocks.shape[1], freedom) < _LEVEL)
+    return bool(fdtrc(shocks.shape[1], freedom, ratio) < _LEVEL)
 
 
 def _regression(de: Array, whitened: Array) -> tuple[Array, Array, Array]:

@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from airtruth.numerics.normal_equations import scaled_inverse
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
@@ -68,13 +68,13 @@ def homogeneity(problem: TraceProblem, fitted: PosteriorFit) -> Homogeneity:
     excess = float(inflation(problem, _at_own(fitted, of_records, kept, x, h))[kept].max()) ** 2
     everyone = np.arange(len(x))
     statistic, degrees = spread(x, h)
-    p_value = float(chi2.sf(statistic / excess, max(degrees, 1)))
+    p_value = float(chdtrc(max(degrees, 1), statistic / excess))
     if len(x) < _SEVERAL:
         return Homogeneity(DIFFERENCES, statistic / excess, degrees, p_value, None, 1.0)
     without = [spread(x[everyone != i], h[everyone != i]) for i in everyone]
     outlier = int(np.argmin([value for value, _ in without]))
     rest, own_degrees = without[outlier]
-    rest_p_value = float(chi2.sf(rest / excess, max(own_degrees, 1)))
+    rest_p_value = float(chdtrc(max(own_degrees, 1), rest / excess))
     return Homogeneity(DIFFERENCES, statistic / excess, degrees, p_value, outlier, rest_p_value)
 
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from airtruth.effects.increment import Increment
 from airtruth.physics.motion import Motion
@@ -189,7 +189,7 @@ def is_apart_from_zero(bends: Array, covariance: Array, degrees: float) -> bool:
         where they add nothing to the statistic.
     """
     statistic = bends @ np.linalg.solve(covariance, bends)
-    return bool(chi2.sf(statistic, max(degrees, 1.0)) < _TWO_DEVIATIONS)
+    return bool(chdtrc(max(degrees, 1.0), statistic) < _TWO_DEVIATIONS)
 
 
 def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) -> float:

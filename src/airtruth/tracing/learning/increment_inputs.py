@@ -15,9 +15,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from airtruth.effects.increment import Memory, Shape
+from airtruth.numerics.recursion import recursion
 from airtruth.physics.motion import Motion
 from airtruth.physics.terms import QBAR
 from airtruth.tracing.inference.direction import inserted
@@ -91,7 +91,7 @@ def _linear(signal: Array, start: float, memory: Memory, h_s: float) -> Array:
     ramp = (whole - 1.0) / (pole * h_s)
     driven = h_s * ((whole - ramp) * signal[:, 0] + ramp * signal[:, -1])
     first = -start / pole
-    after, _ = lfilter([1.0], [1.0, -growth], driven.astype(complex), zi=np.array([growth * first]))
+    after = recursion(complex(growth), driven, first)
     z = np.concatenate([[first], after])
     x = wn * wn / damped * z.imag if memory.kind == "mode" else (z / memory.time_s).real
     return np.stack([x[:-1], 0.5 * (x[:-1] + x[1:]), x[1:]], axis=1)

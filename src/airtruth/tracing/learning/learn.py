@@ -45,8 +45,8 @@ _HOPELESS: Final = 8.0
 _HALF: Final = 0.5
 """Evidence over that of the leading shape from which a shape is refitted [-] (judgement: refits have doubled it)."""
 _PROMISING: Final = 0.2
-"""Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted instead [-]
-(judgement: refits have tripled it)."""
+"""Log evidence of a shape without a refit, over what increments lack of that of names without an anomaly, from which it is
+refitted instead [-] (judgement: refits have tripled it)."""
 _AS_GOOD: Final = -1.0
 """Log evidence over that of names from which increments alone are a rival also where they act as the names do [-] (judgement:
 true names lead by 3.7 to 26 in the 13 trials of 28 where such increments were learned)."""
@@ -82,8 +82,8 @@ def with_increments(
         return grown
     bare = (replace(rounds[0], candidates=(), tied=(), profile=None),)
     gain = bare[0].null.cost - last.null.cost - len(last.null.point.sizes) + evidence
-    promising = _PROMISING * gain if last.anomaly.p_value > CRITERION.significant else 0.0
-    alone, alone_evidence = replace(learn, promising=promising).grown(bare)
+    named = gain if last.anomaly.p_value > CRITERION.significant else 0.0
+    alone, alone_evidence = replace(learn, named=named).grown(bare)
     return chosen(grown, alone, alone_evidence - gain, last)
 
 
@@ -138,14 +138,14 @@ class _Learning:
 
     Attributes
     ----------
-    promising : log evidence without a refit that a first increment needs for one [-].
+    named : log evidence of names without an anomaly that increments have to reach [-].
     """
 
     sets: SetTable
     effects: tuple[Effect, ...]
     seed: int
     advance: Advance
-    promising: float = 0.0
+    named: float = 0.0
 
     def grown(self, rounds: tuple[SearchRound, ...]) -> tuple[tuple[SearchRound, ...], float]:
         """The rounds with one more for each accepted increment, and the log evidence of all of them."""
@@ -156,18 +156,18 @@ class _Learning:
                 break
             # derivatives over a signal are flexible enough to describe what a first increment has wrong
             tried = [s for s in every if not (accepted and s.of_derivative)]
-            least = 0.0
+            evident, lacking = 0.0, self.named - _evidence(accepted)
             if last.anomaly.p_value > CRITERION.significant:
                 if accepted:
                     break
-                least = CRITERION.lead
-            candidates = self._candidates(last.null, last, tried, least)
+                evident = CRITERION.lead
+            candidates = self._candidates(last.null, last, tried, evident, max(_PROMISING * lacking, 0.0))
             tied = _tied(candidates)
             rounds = (*rounds[:-1], replace(last, candidates=(*last.candidates, *candidates), tied=tied))
             if not tied:
                 break
             rounds = (*rounds, self._following(rounds, rounds[-1].tied[0].fit))
-        return rounds, sum(0.5 * c.gain for c in _accepted(rounds))
+        return rounds, _evidence(_accepted(rounds))
 
     def _following(self, rounds: tuple[SearchRound, ...], fitted: PosteriorFit) -> SearchRound:
         """The round whose null has the increment; its candidates are scored and none is refitted."""
@@ -181,19 +181,23 @@ class _Learning:
         return replace(own, explanation=last.explanation, posterior=posterior)
 
     def _candidates(
-        self, null: PosteriorFit, last: SearchRound, every: Sequence[Shape], evident: float
+        self, null: PosteriorFit, last: SearchRound, every: Sequence[Shape], evident: float, promising: float
     ) -> tuple[Candidate, ...]:
-        """Refitted increments of the leading shapes, best first; none if the log evidence of the first is below ``evident``."""
+        """Refitted increments of the leading shapes, best first; none if the log evidence of the first is below ``evident``.
+
+        Parameters
+        ----------
+        promising : log evidence of a shape from which it is refitted [-].
+        """
         if not may_begin(self.advance, "learn increments from what remains"):
             return ()
         present = {e.variant for e in _increments_of(null)}
         tried = [s for s in every if s.variant not in present]
-        least = 0.0 if present else self.promising
         screened = _of_each_variant(screen(self.sets.problem, last.null, NO_WHITENER, tried))[:_SHARPENED]
         first = screened[0].log_evidence if screened else -np.inf
-        if first < _PROMISING * max(evident, least):  # no finer detail makes up for that
+        if first < _PROMISING * max(evident, promising):  # no finer detail makes up for that
             return ()
-        leading = _leading(sharpened(self.sets.problem, last.null, NO_WHITENER, screened), least)
+        leading = _leading(sharpened(self.sets.problem, last.null, NO_WHITENER, screened), promising)
         if not leading or leading[0].log_evidence < evident:
             return ()
         learned = []
@@ -218,6 +222,11 @@ class _Learning:
 
 def _increments_of(fitted: PosteriorFit) -> list[Increment]:
     return [e for e in fitted.hypothesis.effects if isinstance(e, Increment)]
+
+
+def _evidence(accepted: Sequence[Candidate]) -> float:
+    """Log evidence of accepted increments [-]."""
+    return sum(0.5 * c.gain for c in accepted)
 
 
 def _accepted(rounds: Sequence[SearchRound]) -> list[Candidate]:

@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from airtruth.numerics.recursion import recursion
 from airtruth.tracing.model.servo_surface import implied_command, servo_path, step_share
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ def damper_surface(damper: Damper, rate_rad_s: Array, dt_s: float, tau_s: float,
     command = damper.gain_s * (np.append(rate_rad_s[:1], rate_rad_s[:-1]) - rate_rad_s[0])
     rho, late = float(np.exp(-dt_s / tau_s)), step_share(dt_s, tau_s, damper.phase)
     moves = (1.0 - rho - late) * command[:-1] + late * command[1:]
-    samples = np.append(0.0, lfilter([1.0], [1.0, -rho], moves))
+    samples = np.append(0.0, recursion(rho, moves))
     return servo_path(samples, command, dt_s, tau_s, cells, damper.phase)
 
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from airtruth.channels import shown
 from airtruth.charts import Band, Bar, Chart, Colour, Mark, Panel, Rule, Stroke, colours_of
@@ -32,7 +32,7 @@ _STROKES: Final[tuple[Stroke, ...]] = ("solid", "dashed", "dotted", "solid", "da
 _SMALLEST: Final = 1e-290
 """Probability up to which a p-value is converted to a normal variable [-] (above underflow)."""
 _LARGEST_SIGMA: Final = 36.0
-"""Size of a normal variable with that probability [-], as norm.isf(0.5e-290) = 36.4."""
+"""Size of a normal variable with that probability [-], as -ndtri(0.5e-290) = 36.4."""
 _MODEL_STROKES: Final[tuple[Stroke, ...]] = ("dashed", "solid", "dotted")
 """Strokes beside the colours of the models, in their order."""
 _POINTS: Final = 600
@@ -250,14 +250,14 @@ def _needed(sigma: Sequence[float]) -> Array:
     """Significance that Holm's rule asks for in each row; it goes by significance, whatever the order of the rows."""
     order = np.argsort(-np.array(sigma), kind="stable")
     needed = np.empty(len(sigma))
-    needed[order] = norm.isf(0.5 * LEVEL / (len(sigma) - np.arange(len(sigma))))
+    needed[order] = -ndtri(0.5 * LEVEL / (len(sigma) - np.arange(len(sigma))))
     return needed
 
 
 def _sigma(candidate: CandidateScore) -> float:
     """The p-value as the size of a normal variable; where it underflows, the root of the score."""
     if candidate.p_value_alone > _SMALLEST:
-        return float(norm.isf(0.5 * candidate.p_value_alone))
+        return float(-ndtri(0.5 * candidate.p_value_alone))
     return max(abs(candidate.z), _LARGEST_SIGMA)
 
 
@@ -332,7 +332,7 @@ def _whiteness(
     step = max(1, -(-n // _POINTS))
     lags = np.arange(1, min(_LAGS + 1, max(2, n // 4)))
     dt = float(record.t_s[1] - record.t_s[0]) if n > 1 else np.nan
-    bound = float(norm.isf(0.025) / np.sqrt(n))
+    bound = float(-ndtri(0.025) / np.sqrt(n))
     series, correlations = [], []
     for model, stroke in zip(models, _MODEL_STROKES, strict=False):
         colour = colours[model]
