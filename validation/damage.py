@@ -32,6 +32,15 @@ def without_fin(plane: Plane, lost: float) -> Plane:
     return replace(plane, lateral=lateral)
 
 
+def without_rudder(plane: Plane, lost: float) -> Plane:
+    """The rudder is lost, with a part of the fin's chord: seven tenths of CYr and Cnr are left, and Cnbeta falls by 0.03."""
+    lateral = plane.lateral.copy()
+    lateral[[0, 2], _R] *= 1.0 - 0.3 * lost
+    lateral[2, _BETA] -= 0.03 * lost
+    lateral[:, _DR] *= 1.0 - lost
+    return replace(plane, lateral=lateral)
+
+
 def without_tip(plane: Plane, lost: float) -> Plane:
     """The outer part of the left semispan is lost: elliptical lift, a seventh of the wing's mass in proportion to the lift."""
     y = np.linspace(0.0, 1.0, 4001)
@@ -118,6 +127,7 @@ CASES: Mapping[str, Damage] = {
     "fin-30": _case(without_fin, 0.3, "fin_effectiveness"),
     "fin-60": _case(without_fin, 0.6, "fin_effectiveness"),
     "fin-100": _case(without_fin, 1.0, "fin_effectiveness", short=True),
+    "rudder-100": _case(without_rudder, 1.0, "rudder_effectiveness"),
     "tip-10": _case(without_tip, 0.10, "wing_tip_loss"),
     "tip-20": _case(without_tip, 0.20, "wing_tip_loss"),
     "tip-25": _case(without_tip, 0.25, "wing_tip_loss"),
@@ -125,7 +135,7 @@ CASES: Mapping[str, Damage] = {
     "stabiliser-25": _case(without_stabiliser, 0.25, "tail_effectiveness"),
     "aileron-stuck-0": _case(stuck_aileron, 0.0, "aileron_effectiveness"),
     "aileron-stuck-4": _case(stuck_aileron, 4.0 * _DEG, "aileron_effectiveness"),
-    "flap": Damage(without_flap(GTM), ("wing_effectiveness", "derivatives")),
+    "flap": Damage(without_flap(GTM), ("flap_loss",)),
     "cg-side-3": _case(cg_to_the_side, 0.03, "cg_shift_y"),
     "mass-12": _case(heavier, 1.12, "mass_error"),
     "none": Damage(GTM, ()),

@@ -181,12 +181,13 @@ def test_a_cg_to_the_right_rolls_to_the_right(gtm, at, tmp_path):
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_a_lost_wing_tip_rolls_to_its_side_at_rest(gtm, at, point, tmp_path, side):
-    effect = EFFECTS["wing_tip_loss" if side == "left" else "wing_tip_loss:right"]
-    plane = flights.changed(gtm, effect.change({"fraction": 0.1}), tmp_path, at.condition)
+@pytest.mark.parametrize(("name", "fraction"), [("wing_tip_loss", 0.1), ("flap_loss", 0.8)])
+def test_a_lost_part_of_the_wing_rolls_to_its_side_at_rest(gtm, at, tmp_path, name, fraction, side):
+    effect = EFFECTS[name if side == "left" else f"{name}:right"]
+    plane = flights.changed(gtm, effect.change({"fraction": fraction}), tmp_path, at.condition)
     found = accelerations(plane, at) - accelerations(gtm, at)
     sign = -1.0 if side == "left" else 1.0
-    # lift of a tenth of the semispan at 0.93 of it, and the CG that moves to the other side
+    # lift of a tenth of the semispan at 0.93 of it or of most of a flap, and the CG that moves to the other side
     assert sign * found[1] > 0.0
     held = trim(plane, at.condition)
     assert sign * (held.surfaces_rad["aileron"] - at.surfaces_rad["aileron"]) > np.deg2rad(1.0)
@@ -261,6 +262,8 @@ lift_slope = { value = 3.0 }
 [wing]
 taper = { value = 0.35 }
 aileron_inboard = { value = 0.5 }
+flap_outboard = { value = 0.45 }
+flap_depth = { value = 0.3 }
 """
 
 
@@ -278,6 +281,7 @@ def test_fin_and_wing_of_an_aircraft_toml(gtm, tmp_path):
     assert stated.fin_height == pytest.approx(0.6 / 6.8488, rel=1e-4)
     assert stated.fin_lift == pytest.approx(3.0 * 0.9 / 5.9018, rel=1e-4)
     assert (stated.taper, stated.aileron) == (0.35, (0.5, plain.aileron[1]))
+    assert (stated.flap, stated.flap_depth) == ((plain.flap[0], 0.45), 0.3)
     aft = Change(declared=(DeclaredTerm("cg", 0.1),))
     moved = flights.changed(planes.load(tmp_path / "a" / gtm.name), aft, tmp_path / "b")
     assert tail_geometry(moved).side.fin_arm == pytest.approx((3.4 - 0.09153) / 6.8488, rel=1e-4)

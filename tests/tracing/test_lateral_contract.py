@@ -40,6 +40,7 @@ OTHERS = {
     "rudder_effectiveness": "factor",
     "fin_effectiveness": "factor",
     "wing_tip_loss": "fraction",
+    "flap_loss": "fraction",
     "cg_shift_y": "dy_m",
     "inertia_error:ixx": "factor",
     "inertia_error:izz": "factor",

@@ -11,7 +11,8 @@ from airtruth.tracing.model.reading import read
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import filter_inputs, kernel_input
 from airtruth.units import DEG
-from validation.lateral_truth import Flight, log_of
+from validation import lateral_truth
+from validation.lateral_truth import GTM, Flight, log_of
 
 FLIGHT = Flight(duration_s=10.0, seed=3).quiet()
 GUST = 0.6 * DEG
@@ -44,3 +45,23 @@ def test_the_upwash_of_a_record_turns_its_path():
     own = lr.per_record(upwash=0.01)
     turned = kernel_input(given, lr.SETTINGS, lr.common(), own).grid.ground_attack_rad
     np.testing.assert_allclose(turned - given.grid.ground_attack_rad, 0.01)
+
+
+def test_a_gust_along_the_body_is_a_tailwind_of_the_record(monkeypatch):
+    """Behind a gust of 2 % of the speed that turns with the aircraft, the yaw rate turns the air by 2 % less than over ground."""
+    share, gusts = 0.02, iter((1.0, 0.0, 0.0))
+
+    def constant(_rng, samples, *_):
+        return np.full(samples, share * GTM.speed * next(gusts))
+
+    monkeypatch.setattr(lateral_truth, "dryden", constant)
+    log = log_of(Flight(duration_s=5.0).quiet())
+    record = TraceRecord(read(log, LATERAL)[0], lr.plant(), lr.LENGTH)
+    start = [log.channels[name][0] for name in ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad")]
+    error = {
+        tailwind: np.sqrt(
+            (lr.responded(record, own=lr.per_record(start, tailwind=tailwind)).e[:, 0] ** 2).mean()
+        )
+        for tailwind in (0.0, share / (1.0 - share))
+    }
+    assert error[share / (1.0 - share)] < 0.3 * error[0.0]

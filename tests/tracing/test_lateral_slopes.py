@@ -97,7 +97,7 @@ def test_derivatives_are_those_of_flights(name):
     given = arguments(*CASES[name])
     made = check(given, EVERY)
     absent = {*(np.flatnonzero(given[2][COMMON.colour_shares] <= 0.0) + COMMON.colour_shares.start).tolist()}
-    absent |= {COMMON.size + OWN.index("upwash")}  # a difference of flights
+    absent |= {COMMON.size + OWN.index(name) for name in ("upwash", "tailwind")}  # differences of flights
     assert {*EVERY.tolist()} - {*made.parameters.tolist()} == absent
 
 

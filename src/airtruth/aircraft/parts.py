@@ -54,26 +54,33 @@ class Fin(Strict):
 
 
 class Wing(Strict):
-    """Plan form of the wing, for the loss of a wing tip.
+    """Plan form of the wing, for the loss of a wing tip or of a flap.
 
-    taper: chord at the tip over that at the root; aileron_inboard, aileron_outboard: ends of the ailerons in semispans;
-    mass_share: mass of the wing over that of the aircraft.
+    taper: chord at the tip over that at the root; aileron_inboard, aileron_outboard, flap_inboard, flap_outboard: ends of the
+    ailerons and of the flaps in semispans; flap_depth: chord of the flaps over that of the wing; mass_share: mass of the wing
+    over that of the aircraft.
     """
 
     taper: qt.Ratio = Quantity(value=SideGeometry.taper)
     aileron_inboard: qt.Ratio = Quantity(value=SideGeometry.aileron[0])
     aileron_outboard: qt.Ratio = Quantity(value=SideGeometry.aileron[1])
+    flap_inboard: qt.Ratio = Quantity(value=SideGeometry.flap[0])
+    flap_outboard: qt.Ratio = Quantity(value=SideGeometry.flap[1])
+    flap_depth: qt.Ratio = Quantity(value=SideGeometry.flap_depth)
     mass_share: qt.Ratio = Quantity(value=SideGeometry.wing_mass)
 
     @model_validator(mode="after")
     def _possible(self) -> Wing:
-        qt.require_positive(self, ("taper", "aileron_outboard", "mass_share"))
-        first, last = self.aileron_inboard.value, self.aileron_outboard.value
-        if not 0.0 <= first < last <= 1.0:
-            raise ValueError(
-                f"aileron_inboard = {first:g} and aileron_outboard = {last:g}: ends in semispans, from 0 at the root to 1 at "
-                "the tip, the inboard one first"
-            )
+        names = [name for name in type(self).model_fields if not name.endswith("_inboard")]
+        qt.require_positive(self, names)
+        for end in (name for name in names if name.endswith("_outboard")):
+            start = end.replace("_outboard", "_inboard")
+            first, last = getattr(self, start).value, getattr(self, end).value
+            if not 0.0 <= first < last <= 1.0:
+                raise ValueError(
+                    f"{start} = {first:g} and {end} = {last:g}: ends in semispans, from 0 at the root to 1 at the tip, the "
+                    "inboard one first"
+                )
         return self
 
 

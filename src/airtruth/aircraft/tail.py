@@ -38,6 +38,8 @@ def _side_geometry(aircraft: Aircraft, aspect_ratio: float | None) -> SideGeomet
             result,
             taper=wing.taper.value,
             aileron=(wing.aileron_inboard.value, wing.aileron_outboard.value),
+            flap=(wing.flap_inboard.value, wing.flap_outboard.value),
+            flap_depth=wing.flap_depth.value,
             wing_mass=wing.mass_share.value,
         )
     if fin is None:

@@ -50,18 +50,7 @@ def _tip(side: str, variant: str) -> Effect:
         name="wing_tip_loss",
         variant=variant,
         where="declared",
-        parameters=(
-            Parameter(
-                "fraction",
-                "-",
-                f"part of the {side} semispan that is lost",
-                low=0.0,
-                high=0.5,
-                material=0.02,
-                one_sided=True,
-                step=1e-3,
-            ),
-        ),
+        parameters=(_lost(f"part of the {side} semispan that is lost", 0.5, 0.02),),
         describe=_caused(f"{side}_wing_tip", "fraction"),
         explanation=f"The {side} wing tip is lost: roll damping and dihedral effect fall, the {side} aileron with them, the "
         "aircraft rolls to that side at rest, and the CG moves away from it.",
@@ -72,6 +61,32 @@ def _tip(side: str, variant: str) -> Effect:
         "at rest grows with the lift.",
         in_derivatives=True,
         prior=Prior(0.15, 0.0, 0.5, shape=0.3, log_odds=-6.0),
+    )
+
+
+def _flap(side: str, variant: str) -> Effect:
+    return Effect(
+        name="flap_loss",
+        variant=variant,
+        where="declared",
+        parameters=(_lost(f"part of the {side} trailing-edge flap that is lost", 1.0, 0.1),),
+        describe=_caused(f"{side}_flap", "fraction"),
+        explanation=f"The {side} trailing-edge flap is lost: the aircraft rolls to that side with its lift, and roll damping and "
+        "dihedral effect fall a little.",
+        source=f"Strip theory with the chord that is lost; {_LATERAL}, section 5.7. Ends and chord of the flaps, taper and mass "
+        "of the wing are those of [wing] in aircraft.toml. Material: a tenth of a flap, a rolling moment that half a degree of "
+        "the GTM's aileron balances.",
+        distinguished_by="The aileron keeps its effectiveness, and roll damping loses two fifths of what it loses with a wing "
+        "tip of the same rolling moment. cg_shift_y yaws the aircraft too.",
+        in_derivatives=True,
+        prior=Prior(0.5, 0.0, 1.0, shape=0.3, log_odds=-6.0),
+    )
+
+
+def _lost(meaning: str, most: float, material: float) -> Parameter:
+    """The part of something that is lost, ``fraction``."""
+    return Parameter(
+        "fraction", "-", meaning, low=0.0, high=most, material=material, one_sided=True, step=1e-3
     )
 
 
@@ -243,6 +258,8 @@ EFFECTS: Final = (
     ),
     _tip("left", ""),
     _tip("right", "right"),
+    _flap("left", ""),
+    _flap("right", "right"),
     _of_one(
         "adverse_yaw",
         "Cnda",

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from airtruth.physics.composition_lateral import (
     SideGeometry,
+    Strips,
     cg_part,
     fin_part,
     inertia_parts,
-    tip_at_rest,
-    tip_part,
+    lost_at_rest,
+    lost_part,
 )
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q
@@ -137,16 +138,14 @@ def _fin(derivatives: Array, geometry: TailGeometry) -> Array:
     return fin_part(derivatives, geometry.side)
 
 
-def _tip(derivatives: Array, geometry: TailGeometry) -> Array:
-    return tip_part(derivatives, geometry.side)
-
-
-def _without_left_tip(geometry: TailGeometry) -> Mapping[str, float]:
-    return tip_at_rest(geometry.side, -1.0)
-
-
-def _without_right_tip(geometry: TailGeometry) -> Mapping[str, float]:
-    return tip_at_rest(geometry.side)
+def _of_wing(strips: Callable[[SideGeometry], Strips], side: float) -> Part:
+    """Lost strips of the right (1) or the left (-1) half of the wing."""
+    return Part(
+        0.0,
+        lambda derivatives, geometry: lost_part(derivatives, geometry.side, strips(geometry.side)),
+        LATERAL.name,
+        lambda geometry: lost_at_rest(geometry.side, strips(geometry.side), side),
+    )
 
 
 PARTS: Final[Mapping[str, Part]] = MappingProxyType(
@@ -157,12 +156,14 @@ PARTS: Final[Mapping[str, Part]] = MappingProxyType(
         "aerodynamic_center": Part(0.0, _centre),
         "icing": Part(0.0, lambda derivatives, _: np.array(ICED) * derivatives),
         "fin": Part(1.0, _fin, LATERAL.name),
-        "left_wing_tip": Part(0.0, _tip, LATERAL.name, _without_left_tip),
-        "right_wing_tip": Part(0.0, _tip, LATERAL.name, _without_right_tip),
+        "left_wing_tip": _of_wing(lambda side: side.tip, -1.0),
+        "right_wing_tip": _of_wing(lambda side: side.tip, 1.0),
+        "left_flap": _of_wing(lambda side: side.own_flap, -1.0),
+        "right_flap": _of_wing(lambda side: side.own_flap, 1.0),
     }
 )
 """Causes by name: tail, wing, dynamic pressure and fin are factors, the aerodynamic centre counts aft in chords, icing is a
-severity, 1 for the reference ice, and a wing tip is the part of its semispan that is lost."""
+severity, 1 for the reference ice, a wing tip is the part of its semispan that is lost, and a flap the part of it that is lost."""
 CAUSES: Final[Mapping[str, float]] = MappingProxyType(
     {name: part.neutral for name, part in PARTS.items()}
     | dict.fromkeys((name for m in MOTIONS.values() for name in m.parameters), 0.0)

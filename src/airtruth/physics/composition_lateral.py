@@ -1,4 +1,4 @@
-"""Contributions of fin and wing tips to the lateral derivatives, from the declared derivatives and the geometry.
+"""Contributions of the fin and of parts of the wing to the lateral derivatives, from the declared derivatives and the geometry.
 
 The directions are first order, as those of `airtruth.physics.composition`. Body axes, about the CG, rates over p b/(2V) and
 r b/(2V).
@@ -29,6 +29,23 @@ _REFERENCE_LOSS: Final = 0.2
 
 
 @dataclass(frozen=True)
+class Strips:
+    """A part of one half of the wing that may be lost.
+
+    Attributes
+    ----------
+    first, last : inboard and outboard end in semispans [-].
+    chord : its share of the local chord, from the trailing edge [-].
+    size : size of the cause that loses all of it [-]; other sizes are in proportion.
+    """
+
+    first: float
+    last: float
+    chord: float = 1.0
+    size: float = 1.0
+
+
+@dataclass(frozen=True)
 class SideGeometry:
     """Declared fin and wing; None where a value has to be inferred. The other defaults are judgement.
 
@@ -38,6 +55,8 @@ class SideGeometry:
     aspect_ratio : of the wing [-]: transports and light aircraft have 7 to 10.
     taper : chord at the tip over that at the root [-].
     aileron : inboard and outboard end of the ailerons in semispans [-].
+    flap : the same of the trailing-edge flaps: from the body of a transport to its ailerons.
+    flap_depth : chord of the flaps over that of the wing [-]: transports have 0.2 to 0.3.
     wing_mass : mass of the wing over that of the aircraft [-]: transports have 0.10 to 0.13.
     fin_arm, fin_height : distance of the fin's aerodynamic centre behind and above the CG over the span [-].
     fin_lift : lift slope of the fin by the wing area and the free dynamic pressure [1/rad].
@@ -49,6 +68,8 @@ class SideGeometry:
     aspect_ratio: float = 8.0
     taper: float = 0.4
     aileron: tuple[float, float] = (0.6, 0.95)
+    flap: tuple[float, float] = (0.1, 0.6)
+    flap_depth: float = 0.25
     wing_mass: float = 0.12
     fin_arm: float | None = None
     fin_height: float | None = None
@@ -56,6 +77,16 @@ class SideGeometry:
     rudder_on_fin: bool = True
     inertia_kg_m2: tuple[float, float, float] | None = None
     mass_kg: float = 0.0
+
+    @property
+    def tip(self) -> Strips:
+        """A wing tip, by the part of its semispan that is lost."""
+        return Strips(1.0 - _REFERENCE_LOSS, 1.0, size=_REFERENCE_LOSS)
+
+    @property
+    def own_flap(self) -> Strips:
+        """The flap of one side, by the part of it that is lost."""
+        return Strips(*self.flap, chord=self.flap_depth)
 
 
 def fin_part(derivatives: Array, geometry: SideGeometry) -> Array:
@@ -92,40 +123,37 @@ def fin_part(derivatives: Array, geometry: SideGeometry) -> Array:
     return part
 
 
-def tip_part(derivatives: Array, geometry: SideGeometry) -> Array:
-    """Change of the lateral derivatives per semispan lost at one wing tip.
+def lost_part(derivatives: Array, geometry: SideGeometry, lost: Strips) -> Array:
+    """Change of the lateral derivatives per unit of a cause that loses strips of one half of the wing.
 
-    Strip theory with a lift slope that is constant along the span: the tip has the share of its chord times y in the dihedral
-    effect, of its chord times y^2 in the roll damping, and of its aileron's chord times y in the aileron.
+    Strip theory with a lift slope that is constant along the span: the strips have the share of their chord times y in the
+    dihedral effect and of their chord times y^2 in the roll damping. The part of an aileron behind them is lost with them, by its
+    share of chord times y.
 
     Parameters
     ----------
     derivatives, geometry : as in `fin_part`.
     """
     of_wing = derivatives - fin_part(derivatives, geometry)
-    outboard = 1.0 - _REFERENCE_LOSS
-    first, last = geometry.aileron
-    lost = {
-        power: 0.5 * _strips(geometry, outboard, 1.0, power) / _strips(geometry, 0.0, 1.0, power)
-        for power in (1, 2)
-    }
-    of_aileron = 0.5 * _strips(geometry, min(max(outboard, first), last), last, 1)
-    of_aileron /= _strips(geometry, first, last, 1)
     part = np.zeros_like(derivatives)
     for signal, power in (("beta", 1), ("phat", 2)):
         at = LATERAL.at("Cl", signal)
-        part[at] = -lost[power] * of_wing[at]
+        share = _strips(geometry, lost.first, lost.last, power) / _strips(geometry, 0.0, 1.0, power)
+        part[at] = -0.5 * lost.chord * share * of_wing[at]
+    first, last = geometry.aileron
+    inboard, outboard = (min(max(y, first), last) for y in (lost.first, lost.last))
     column = LATERAL.column("aileron")
-    part[column] = -of_aileron * derivatives[column]
-    return np.asarray(part / _REFERENCE_LOSS)
+    of_aileron = _strips(geometry, inboard, outboard, 1) / _strips(geometry, first, last, 1)
+    part[column] = -0.5 * of_aileron * derivatives[column]
+    return np.asarray(part / lost.size)
 
 
-def tip_at_rest(geometry: SideGeometry, side: float = 1.0) -> Mapping[str, float]:
-    """Declared quantities that a lost wing tip changes beside the derivatives, per semispan lost.
+def lost_at_rest(geometry: SideGeometry, lost: Strips, side: float = 1.0) -> Mapping[str, float]:
+    """Declared quantities that lost strips of a wing change beside the derivatives, per unit of their cause.
 
     Parameters
     ----------
-    side : 1 for the right tip, -1 for the left one.
+    side : 1 for the right half of the wing, -1 for the left one.
 
     Returns
     -------
@@ -133,7 +161,7 @@ def tip_at_rest(geometry: SideGeometry, side: float = 1.0) -> Mapping[str, float
     where mass and inertias are declared [-]. Lift and mass of a strip are in proportion to its chord.
     """
     arm, square = (
-        0.5 * _strips(geometry, 1.0 - _REFERENCE_LOSS, 1.0, power) / _strips(geometry, 0.0, 1.0, 0)
+        0.5 * lost.chord * _strips(geometry, lost.first, lost.last, power) / _strips(geometry, 0.0, 1.0, 0)
         for power in (1, 2)
     )
     half = 0.5 * geometry.span_m
@@ -145,7 +173,7 @@ def tip_at_rest(geometry: SideGeometry, side: float = 1.0) -> Mapping[str, float
         "inertia_xx": -turned / xx,
         "inertia_zz": -turned / zz,
     }
-    return {name: amount / _REFERENCE_LOSS for name, amount in found.items()}
+    return {name: amount / lost.size for name, amount in found.items()}
 
 
 def inertia_parts(derivatives: Array, geometry: SideGeometry) -> dict[str, Array]:
@@ -204,4 +232,4 @@ def _strips(geometry: SideGeometry, first: float, last: float, power: int) -> fl
     return ends[1] - ends[0]
 
 
-__all__ = ["SideGeometry", "cg_part", "fin_part", "inertia_parts", "tip_at_rest", "tip_part"]
+__all__ = ["SideGeometry", "Strips", "cg_part", "fin_part", "inertia_parts", "lost_at_rest", "lost_part"]

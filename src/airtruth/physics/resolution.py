@@ -1,7 +1,7 @@
 """Causes of a change of the derivatives, as linear terms about a trim.
 
 The increments are first order (`airtruth.physics.composition`): several causes add. Forces and moments stay as they are at
-the trim, whose own change by the cause is left out; a lost wing tip alone states what it changes at rest.
+the trim, whose own change by the cause is left out; a lost part of the wing alone states what it changes at rest.
 """
 
 from __future__ import annotations

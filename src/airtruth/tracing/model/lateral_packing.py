@@ -92,7 +92,7 @@ def _over_ground(alpha_rad: Array, ground_m_s: Array, theta_rad: Array, s: Signa
     """Angle of attack over ground, from the climb that the specific forces give, with the mean of the one of the air [rad].
 
     The gusts that the vane reads do not turn the path of the aircraft. The mean gust of the record remains unknown; it is a
-    parameter of the record (`airtruth.tracing.model.parameters.RecordEntries.upwash`).
+    parameter of the record (`airtruth.tracing.model.parameters.RecordEntries.mean_gust`).
 
     Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1 (h').
     """

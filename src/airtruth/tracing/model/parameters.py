@@ -140,8 +140,8 @@ class RecordEntries(Entries):
     gusts : initial states of the gust's filter [-]; start : motion and gusts.
     bias : of each output [its unit]; trim : increments of the coefficients at the trim [-]; offsets : both.
     log_gust : logarithm of the standard deviation of the gust [m/s].
-    upwash : mean angle of a vertical gust [rad], where the angle of attack is a known input.
-    deterministic : all but the gusts (indices): initial states, biases, trim, upwash.
+    mean_gust : mean gust over the airspeed, up [rad] and along the path [-], where the angle of attack is a known input.
+    deterministic : all but the gusts (indices): initial states, biases, trim, mean gust.
     """
 
     def __init__(self, motion: Motion) -> None:
@@ -155,17 +155,17 @@ class RecordEntries(Entries):
                 *(FreeEntry(f"{c.name}0", "-", 1e-5 if c.length is None else 1e-6) for c in coefficients),
                 FreeEntry(f"log_sigma_{gust}", "-", 1e-4),
                 *(FreeEntry("upwash", "rad", 1e-4) for _ in motion.known_signals),
+                *(FreeEntry("tailwind", "-", 1e-4) for _ in motion.known_signals),
             ]
         )
-        self.motion_start = slice(0, len(states))
-        self.gusts = self.span(f"{gust}1", f"{gust}2")
+        self.motion_start, self.gusts = slice(0, len(states)), self.span(f"{gust}1", f"{gust}2")
         self.start = slice(0, self.gusts.stop)
         self.bias = slice(self.start.stop, self.start.stop + len(outputs))
         self.trim = slice(self.bias.stop, self.bias.stop + len(coefficients))
         self.offsets = slice(self.bias.start, self.trim.stop)
         self.log_gust = self.index(f"log_sigma_{gust}")
-        self.upwash = slice(self.log_gust + 1, self.size)
-        self.deterministic = np.r_[self.motion_start, self.offsets, self.upwash]
+        self.mean_gust = slice(self.log_gust + 1, self.size)
+        self.deterministic = np.r_[self.motion_start, self.offsets, self.mean_gust]
 
 
 def _unit(channel: str) -> str:

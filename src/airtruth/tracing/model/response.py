@@ -276,13 +276,18 @@ def kernel_input(
         more[given.lead :] = external.output
         for row, own in zip(force.values(), external.force, strict=True):
             row[-own.size :] += own
-    upwash = per_record[settings.layout.per_record.upwash]
-    turned = {} if not upwash.size else {"ground_attack_rad": given.grid.ground_attack_rad + upwash}
+    gust, path = per_record[settings.layout.per_record.mean_gust], {}
+    if gust.size:
+        upwash, tailwind = gust
+        path = {
+            "ground_attack_rad": given.grid.ground_attack_rad + upwash,
+            "ground_m_s": given.grid.ground_m_s * (1.0 + tailwind),
+        }
     signals = given.record.signals
     return KernelInput(
         y=given.y,
         more=more,
-        grid=given.grid._replace(**force, **turned),
+        grid=given.grid._replace(**force, **path),
         corner_rad2=given.corner_rad2,
         dt_s=signals.dt_s,
         sub=signals.sub,

@@ -75,15 +75,15 @@ def _sloped(kernel: KernelInput, settings: Settings, common: Array, wanted: Ints
     """The parameters that have derivatives along the nominal flight.
 
     Correlated noise that is absent adds states once it is there, a play has no slope where it reverses, and no motion states that
-    in the upwash.
+    in the mean gust.
     """
     model = kernel.model
     if not has_slopes(model) or (model.effects.state_index[:, 0] == PLAY).any():
         return wanted[:0]
     shares = settings.layout.common.colour_shares
     absent = np.arange(shares.start, shares.stop)[common[shares] <= 0.0]
-    upwash = common.size + np.arange(settings.layout.per_record.size)[settings.layout.per_record.upwash]
-    return wanted[~np.isin(wanted, [*absent, *upwash])]
+    gust = common.size + np.arange(settings.layout.per_record.size)[settings.layout.per_record.mean_gust]
+    return wanted[~np.isin(wanted, [*absent, *gust])]
 
 
 def respond_with_slopes(

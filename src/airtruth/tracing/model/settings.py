@@ -62,9 +62,9 @@ _LOG_GUST_STD: Final = 1.5
 """Prior standard deviation of its logarithm [-]: a factor of 4.5 to either side (judgement)."""
 _START_ANGLE_STD, _START_RATE_STD = 0.05, 0.2
 """Prior standard deviations of an initial angle [rad] and of a rate [rad/s] about the first samples (judgement)."""
-_UPWASH_STD: Final = 0.02
-"""Prior standard deviation of the mean angle of a vertical gust [rad] (judgement: light to moderate gusts at 40 m/s, whose
-correlation time is longer than a record)."""
+_MEAN_GUST_STD: Final = 0.02
+"""Prior standard deviation of the mean gust of a record over the airspeed, up [rad] or along the path [-] (judgement: light to
+moderate gusts at 40 m/s, whose correlation time is longer than a record)."""
 GUST_COVARIANCE: Final = np.array([[1.0, 0.5], [0.5, 0.5]])
 """Stationary covariance of the two states of Dryden's vertical filter at unit gust variance [-] (MIL-F-8785C,
 3.7.1.2, by the Lyapunov equation)."""
@@ -236,7 +236,7 @@ def per_record_prior(
     ]
     std[entries.trim] = np.where(free, _UNCONSTRAINED_TRIM_STD, settings.trim_std)
     std[entries.log_gust] = settings.log_gust_std
-    std[entries.upwash] = _UPWASH_STD
+    std[entries.mean_gust] = _MEAN_GUST_STD
     precision = np.diag(std**-2.0)
     precision[entries.gusts, entries.gusts] = np.linalg.inv(GUST_COVARIANCE)
     return initial_per_record(record, settings), precision
