@@ -121,6 +121,7 @@ def _slopes(kind: _Kind) -> None:
         FirstUpdate(np.zeros((1, n, outputs - 1, width)), np.zeros((1, outputs - 1, width))),
         np.zeros((1, n, width)),
         np.zeros((1, outputs, outputs, width)),
+        np.zeros(2, dtype=np.int64),
     )
     innovation_slopes(kind.given, moved, path_of(2, n, outputs), gains, 1.0)
 

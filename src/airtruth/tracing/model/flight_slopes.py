@@ -212,7 +212,7 @@ def _along(
     """`innovation_slopes` from the derivatives of the initial state."""
     model, samples, n = given.model, given.y.shape[0], given.model.states.size
     for k in range(samples):
-        row = k if gains.direct.shape[0] > 1 else 0
+        row = gains.row_of[k]
         at = air_at(given.grid, k * given.sub)
         for i in range(n):
             own.x[i] = own.tried[i] = path.predicted[k, i]

@@ -131,7 +131,9 @@ def respond_with_slopes(
     if not sound:
         return lost, None
     at = common_of(kernel, given.along)
-    gains, more_slopes = slopes_along(nodes, at, moves, steady.lower, steady.share, kernel.corner_rad2)
+    gains, more_slopes = slopes_along(
+        nodes, at, moves, samples, steady.lower, steady.share, kernel.corner_rad2
+    )
     own = _moved(kernel, aircraft, noise, places)
     slopes = innovation_slopes(kernel, own, path, gains, steady.shown)
     h = np.where(moved, moves.h, 1.0)[1:, None, None]

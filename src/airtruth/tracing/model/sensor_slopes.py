@@ -32,19 +32,21 @@ def width_of(parameters: int) -> int:
 
 
 class GainSlopes(NamedTuple):
-    """Derivatives of what the filter used along a flight, see `Path`; one row serves every sample, or each has its own.
+    """Derivatives of what the filter used along a flight, see `Path`; samples with the same derivatives share a row.
 
     Attributes
     ----------
     k_gain : (rows, states, outputs, parameters); first : (rows, states, early, parameters) and (rows, early, parameters).
     direct : (rows, states, parameters).
     scale : (rows, outputs, outputs, parameters).
+    row_of : (samples,) row of each sample.
     """
 
     k_gain: Array
     first: FirstUpdate
     direct: Array
     scale: Array
+    row_of: Ints
 
 
 class Moved(NamedTuple):
