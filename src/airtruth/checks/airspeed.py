@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.local_level import smoothed, walk_to_noise
-from airtruth.numerics.prefilter import butterworth
+from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import G0
 
@@ -29,12 +29,11 @@ _GROUND_SLOPE_M_S2: Final = 0.3
 
 def low_passed(x: Array, dt_s: float, cutoff_hz: float = _CUTOFF_HZ) -> Array:
     """Samples without what is above a cutoff [Hz], without lag; as they are where the log is too slow or short for it."""
-    from scipy.signal import sosfiltfilt
-
     x = np.asarray(x, dtype=np.float64)
-    if 0.45 / dt_s <= cutoff_hz or len(x) < 40:
+    if 0.45 / dt_s <= cutoff_hz:
         return x
-    return np.asarray(sosfiltfilt(butterworth(cutoff_hz, 2, dt_s).copy(), x))
+    sos = butterworth(cutoff_hz, 2, dt_s)
+    return zero_phase(x[None], sos)[0] if len(x) > edge_samples(sos) else x
 
 
 def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:

@@ -28,7 +28,7 @@ from airtruth.identification import AircraftConstants
 from airtruth.identification.declared_sensors import moved_to_cg
 from airtruth.identification.record_constants import stated_value
 from airtruth.logs.flight_log import Batch, FlightLog, batches
-from airtruth.numerics.prefilter import butterworth
+from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.readings import increments_over, reading_increments, state_of
@@ -333,9 +333,7 @@ def _advanced(x: Array, samples: float) -> Array:
 
 def _rate(x: Array, dt_s: float) -> Array:
     """(runs, samples) derivative of a low-passed rate [rad/s2]."""
-    from scipy.signal import sosfiltfilt
-
-    smooth = sosfiltfilt(butterworth(_CUTOFF_HZ, 2, dt_s).copy(), x, axis=1)
+    smooth = zero_phase(x, butterworth(_CUTOFF_HZ, 2, dt_s))
     return np.asarray(np.gradient(smooth, dt_s, axis=1))
 
 

@@ -243,7 +243,6 @@ def fit(
         covariance=_covariance(search, at, start.of_vector(x)),
         converged=converged,
         shortfall=0.0 if converged else search.shortfall(x, at),
-        outrun=status is SolverStatus.OUTRUN,
     )
 
 

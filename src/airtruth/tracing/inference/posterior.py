@@ -153,7 +153,6 @@ class PosteriorFit:
     covariance : (common and sizes, common and sizes), per-record parameters free.
     converged : whether the search ended by its tolerance.
     shortfall : log-likelihood that an undamped step promises where it did not, else none.
-    outrun : whether the search ended early, out of reach of a rival; it counts as converged.
     """
 
     hypothesis: Hypothesis
@@ -165,7 +164,6 @@ class PosteriorFit:
     covariance: Array
     converged: bool
     shortfall: float = 0.0
-    outrun: bool = False
 
     @property
     def layout(self) -> Layout:

@@ -16,7 +16,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -186,6 +185,8 @@ def shaped(mean_rad: Array, path_rad: Array, cells: int) -> Array:
 
 def smooth(surface_rad: Array, cells: int) -> Array:
     """The cubic spline through the samples on a fine grid of ``cells`` cells per sample."""
+    from scipy.interpolate import CubicSpline  # slow to import, and few surfaces are those of servos
+
     at = np.arange(surface_rad.size)
     fine = np.arange((surface_rad.size - 1) * cells + 1) / cells
     return np.asarray(CubicSpline(at, surface_rad)(fine))
