@@ -24,7 +24,14 @@ from airtruth.identification.lateral.model_error import (
     with_uncertain_attack,
 )
 from airtruth.identification.lateral.observation import steady_flight
-from airtruth.identification.lateral.predictor import PROCESS, factor_names, levels, outputs_of, records_of
+from airtruth.identification.lateral.predictor import (
+    PROCESS,
+    factor_names,
+    levels,
+    outputs_of,
+    records_by_terms,
+    records_of,
+)
 from airtruth.identification.lateral.solve import regress_batch, regress_joint
 from airtruth.identification.likelihood.fit import (
     Records,
@@ -115,14 +122,15 @@ def estimate(
     parts = []
     for part in chunks(batch):
         start = regress_batch(part, values, "ls", None, replace(options, covariance="none"))
-        data = records_of(part, values, options, GUST_LENGTH_M, gusts=gusts)
+        choices = (options.terms, TERMS) if gusts else (options.terms,)
+        data, *others = records_by_terms(part, values, options, GUST_LENGTH_M, choices, gusts=gusts)
         search = search_of(_noise(part, constants), options, gusts=gusts)
         maxima = maximum_of_each(data, _start(start.theta, search, gusts=gusts), search)
         known = np.flatnonzero(np.isfinite(maxima.z).all(axis=1))
         if not gusts or not known.size:
             memory = memory_of(data, maxima.z)
         else:
-            more = records_of(part, values, replace(options, terms=TERMS), GUST_LENGTH_M, gusts=gusts)
+            more = others[0]
             random = random_terms(options, search.weight.size)
             z = random.point(maxima.z[known])
             made = score(more.layout, known, z, np.arange(z.shape[1]), more.signals, more.dt_s)

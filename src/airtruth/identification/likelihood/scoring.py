@@ -116,7 +116,7 @@ class _Posterior:
         """Posterior at points x (rows, free); None where the cost is not finite."""
         points: list[_Point | None] = [None] * len(index)
         sound = np.asarray(np.isfinite(x).all(axis=1))
-        short = sound & (np.zeros_like(sound) if near is None else self._short(near))
+        short = sound & (np.zeros_like(sound) if near is None else self._short(x, near))
         for rows, informed in ((np.flatnonzero(sound & ~short), True), (np.flatnonzero(short), False)):
             if not rows.size:
                 continue
@@ -142,13 +142,14 @@ class _Posterior:
                     points[made[0]] = _Point(float(made[1]), *made[2:])
         return points
 
-    def _short(self, near: Sequence[_Point]) -> NDArray[np.bool_]:
-        """Points from which a step promises little enough."""
+    def _short(self, x: Array, near: Sequence[_Point]) -> NDArray[np.bool_]:
+        """Points x (rows, free) that the points near to them promise to be little better."""
         if self.near == 0.0:
             return np.zeros(len(near), dtype=np.bool_)
         gradient, curvature = np.stack([p.gradient for p in near]), np.stack([p.curvature for p in near])
-        step = normal_equations.scaled_step(gradient, curvature, np.full(len(near), RIDGE))
-        return np.asarray(-0.5 * (gradient * step).sum(axis=1) < self.near)
+        step = x - np.stack([p.x for p in near])
+        bent = np.matmul(curvature, step[:, :, None])[:, :, 0]
+        return np.asarray(-(step * (gradient + 0.5 * bent)).sum(axis=1) < self.near)
 
     def _curvature(self, gradient: Array, information: Array, off: Array) -> Array:
         """Curvature (rows, free, free) of the posterior for a step, from gradient and information of the likelihood.
