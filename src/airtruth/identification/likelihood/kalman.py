@@ -98,7 +98,7 @@ def score(
     free : indices of the parameters to differentiate for.
     signals : records of all runs.
     dt_s : sample period [s].
-    informed : whether the information is wanted; the gradient alone takes less than half of the time.
+    informed : whether the information is wanted; the gradient alone takes half of the time.
     """
     samples, outputs = signals.y.shape[1:]
     result = LikelihoodScore(
