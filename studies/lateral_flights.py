@@ -178,13 +178,19 @@ def causes_table(
 ) -> Table:
     """Errors of joint estimates by filter error over the bound, and what the steady angle of attack explains of them.
 
+    The deviation that the estimator states is the bound of its own model: with the terms of unknown size, the noise of the
+    moments and the unknown angle.
+
     Parameters
     ----------
     attack_rad : angle of attack of the trim, at which the truth holds.
     """
     size = FLOWN[name][-1]
-    error, _ = errors(list(joint(own, gtm, "filter-error", Options(), size)), truth)
-    error /= least_deviations(own, gtm, truth, GUSTS[FLOWN[name][1]]) / np.sqrt(size)
+    made = list(joint(own, gtm, "filter-error", Options(), size))
+    least = least_deviations(own, gtm, truth, GUSTS[FLOWN[name][1]]) / np.sqrt(size)
+    error = errors(made, truth)[0] / least
+    variance = np.mean([np.diagonal(e.covariance[0]) for e in made if e.converged[0]], axis=0)
+    stated = 100.0 * np.sqrt(variance) / np.abs(truth) / least
     found = np.degrees(
         [
             (
@@ -199,8 +205,16 @@ def causes_table(
     share = np.array([np.corrcoef(off, column)[0, 1] for column in error.T])
     rest = spread * np.sqrt(1.0 - share**2)
     total = np.sqrt((error**2).mean(axis=0))
-    columns = (total, bias, spread, rest, np.hypot(bias, rest))
-    every = ("error", "bias", "deviation", "deviation at the known angle", "error at the known angle")
+    columns = (total, bias, spread, rest, np.hypot(bias, rest), stated, total / stated)
+    every = (
+        "error",
+        "bias",
+        "deviation",
+        "deviation at the known angle",
+        "error at the known angle",
+        "stated deviation",
+        "error over it",
+    )
     rows = [
         (parameter, *(f"{column[j]:.1f}" for column in columns))
         for j, parameter in enumerate(LATERAL.parameters)

@@ -11,6 +11,7 @@ from airtruth.identification.lateral.predictor import SURPLUS, factor_names, lev
 from airtruth.identification.likelihood.fit import scored
 from airtruth.identification.likelihood.linearise import Matrices, slopes, values_of
 from airtruth.identification.likelihood.predictor import layout
+from airtruth.identification.likelihood.scoring import secant
 from airtruth.numerics.discretise import assemble, step
 from airtruth.physics.lateral import lateral_system
 from airtruth.physics.motion import LATERAL
@@ -95,6 +96,46 @@ def test_gradient_is_that_of_differences():
         down[0, i] -= step
         slope = (scored(data, up, run, free)[0] - scored(data, down, run, free)[0]) / (2.0 * step)
         assert slope[0] == pytest.approx(gradient[0, i], rel=1e-5, abs=1e-5 * np.sqrt(information[0, i, i]))
+
+
+@pytest.mark.parametrize("gusts", [True, False])
+def test_gradient_without_information_is_that_with_it(gusts):
+    """The adjoint of the filter has the gradient of the differentiated filter."""
+    data = records_of(fly(runs=2, seconds=6.0, gust=0.6, seed=8), GTM, Options(), 533.4, gusts=gusts)
+    noise = np.log(
+        [0.6, 6e-4, 9e-3, 6e-3, 9e-4, 0.064, 0.01, 0.01] if gusts else [6e-4, 9e-3, 6e-3, 9e-4, 0.064]
+    )
+    z = np.tile(np.concatenate([1.02 * THETA, noise]), (2, 1))
+    runs, free = np.arange(2), np.arange(z.shape[1])[::-1]
+    cost, gradient, information = scored(data, z, runs, free)
+    cheap, alone, nothing = scored(data, z, runs, free, informed=False)
+    np.testing.assert_array_equal(cheap, cost)
+    np.testing.assert_allclose(alone, gradient, rtol=1e-11)
+    assert np.isnan(nothing).all()
+    assert np.isfinite(information).all()
+
+
+def test_secant_finds_the_curvature_of_a_quadratic_cost():
+    """Broyden's theorem: n steps along conjugate directions give the exact matrix."""
+    exact, curvature = np.diag([3.0, 0.5]), np.eye(2)[None]
+    for moved in np.eye(2)[:, None]:
+        curvature = secant(curvature, moved, moved @ exact)
+        np.testing.assert_allclose(np.matmul(curvature, moved[:, :, None])[0, :, 0], (moved @ exact)[0])
+    np.testing.assert_allclose(curvature[0], exact)
+    bent = secant(curvature, np.ones((1, 2)), -np.ones((1, 2)))
+    np.testing.assert_array_equal(bent, curvature)
+
+
+@pytest.mark.parametrize("gust", [0.0, 1.0])
+def test_information_of_the_point_before_leads_to_the_same_maximum(monkeypatch, gust):
+    batch = fly(runs=3, seconds=8.0, gust=gust, seed=17)
+    fast = identify_batch(batch, GTM, "filter-error", motion=LATERAL)
+    monkeypatch.setattr("airtruth.identification.lateral.likelihood._NEAR", 0.0)
+    plain = identify_batch(batch, GTM, "filter-error", motion=LATERAL)
+    deviation = np.sqrt(np.diagonal(plain.covariance, axis1=1, axis2=2))
+    assert (np.abs(fast.theta - plain.theta) < 0.02 * deviation).all()
+    np.testing.assert_allclose(np.sqrt(np.diagonal(fast.covariance, axis1=1, axis2=2)), deviation, rtol=0.01)
+    assert fast.iterations.sum() <= plain.iterations.sum()
 
 
 def test_records_without_a_vane_or_bank_are_fitted():

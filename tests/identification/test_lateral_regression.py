@@ -10,7 +10,7 @@ from airtruth.identification import LATERAL_METHODS, identify_batch
 from airtruth.identification.doubts import curvature
 from airtruth.identification.estimates import Status, quantities
 from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
-from airtruth.identification.lateral.kernels import grow_less, orthonormal, products
+from airtruth.identification.lateral.kernels import grow_less, orthonormal, products, swept
 from airtruth.identification.lateral.methods import LINEAR
 from airtruth.identification.lateral.observation import observe
 from airtruth.identification.lateral.problems import ls_problem, rate_of, smoothed
@@ -278,3 +278,14 @@ def test_bounded_motions_are_those_of_the_eigenvalues():
     np.testing.assert_array_equal(less[:-1], largest < 0.7)
     assert 0.2 < (largest < 0.7).mean() < 0.8
     assert not less[-1]
+
+
+def test_sums_without_constants_are_those_of_projected_rows():
+    rng = np.random.default_rng(3)
+    z, y, x, free = (rng.normal(size=(rows, 40)) for rows in (5, 3, 5, 2))
+    free[1] = 2.0 * free[0]  # no further constant
+    sums = np.concatenate([z, free]) @ np.concatenate([y, free, x]).T
+    made = np.empty((1, 5, 8))
+    swept(sums[None], 3, 2, 1e-12, made)
+    unit = free[0] / np.linalg.norm(free[0])
+    np.testing.assert_allclose(made[0], (z - np.outer(z @ unit, unit)) @ np.concatenate([x, y]).T, atol=1e-12)

@@ -21,6 +21,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.identification.lateral_inputs import lateral_inputs
 from airtruth.identification.options import Options
 from airtruth.identification.regression.rows import row_factors
 from airtruth.identification.signals import ALPHA, AZ, COMMAND, Q
@@ -40,7 +41,7 @@ _LEVEL: Final = 0.01
 """Range of the cosine of the path angle in a record up to which gravity across the path is constant [-] (judgement: 0.1 m/s2, a
 path that turns by 8 deg; the noise of accelerometers)."""
 NO_LEFT: Final = np.empty((0, 4, 0))
-"""Left sides at constant pressure: the estimators form them from the signals."""
+"""Left sides at constant pressure without lateral motion: the estimators form them from the signals."""
 
 
 class AircraftConstants(Protocol):
@@ -82,8 +83,8 @@ class Observation:
     dt_s : sample period [s].
     signals : (runs, 4, samples) alpha [rad], q [rad/s], az [g], elevator [rad].
     smooth : (runs, 4, samples) the same after the low-pass.
-    left, left_smooth : (runs, 4, samples) left sides of lift and moment at measured dynamic pressure, from
-        `divide`; q and az of ``signals`` are then divided too. Without runs at constant pressure.
+    left, left_smooth : (runs, 4, samples) left sides of lift and moment, from `divide`, at measured dynamic pressure and in
+        records of both motions; q and az of ``signals`` are then divided too. Without runs otherwise.
     command : (runs, samples) elevator command [rad], or None.
     scale : factors of shape (runs,).
     factors : (runs, 4) from `airtruth.identification.regression.rows.row_factors`.
@@ -170,12 +171,14 @@ def pressure_range(batch: Batch) -> Array:
 def across_path(batch: Batch) -> Array:
     """Gravity across the path over that in level flight, (runs, samples) [-]: the cosine of the path angle theta - alpha.
 
-    One where theta is not measured, and in runs whose cosine changes by at most `_LEVEL`, in means over `_BLOCK_S`.
+    With the bank phi it is cos(phi) cos(theta) cos(alpha) + sin(theta) sin(alpha). One where theta is not measured, and in runs
+    whose cosine changes by at most `_LEVEL`, in means over `_BLOCK_S`.
     """
     alpha, theta = batch.channels[LONGITUDINAL.vane], batch.channels.get("theta_rad")
     if theta is None:
         return np.ones_like(alpha)
-    cosine = np.cos(theta - alpha)
+    bank = batch.channels.get("phi_rad", np.zeros_like(alpha))
+    cosine = np.cos(theta - alpha) - (1.0 - np.cos(bank)) * np.cos(theta) * np.cos(alpha)
     return np.where(_range(cosine, batch.dt_s)[:, None] > _LEVEL, cosine, 1.0)
 
 
@@ -212,7 +215,15 @@ def ratios(
     return airspeed_m_s / scale.airspeed_m_s[:, None], force / scale.normal[:, None]
 
 
-def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float, across: Array) -> Array:
+def divide(
+    signals: Array,
+    v: Array,
+    p: Array,
+    airspeed_m_s: Array,
+    dt_s: float,
+    across: Array,
+    lateral: tuple[Array, Array] | None = None,
+) -> Array:
     """Divide q and az of ``signals`` by v and p, in place, and return the left sides.
 
     Parameters
@@ -222,6 +233,7 @@ def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float,
     airspeed_m_s : (runs,) V0.
     dt_s : sample period [s].
     across : (runs, samples) from `across_path`.
+    lateral : parts of alpha' and q' from `lateral_inputs`, which are subtracted; None for none.
 
     Returns
     -------
@@ -237,7 +249,11 @@ def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float,
     signals[:, AZ] /= p
     slope_lift, slope_moment = (np.gradient(x, dt_s, axis=1) for x in (by_lift, by_moment))
     added = -slope_lift * alpha - by_lift * q - G0 / airspeed_m_s[:, None] * across * by_moment
-    return np.stack([by_lift * alpha, by_moment * q, added, -slope_moment * q], axis=1)
+    left = np.stack([by_lift * alpha, by_moment * q, added, -slope_moment * q], axis=1)
+    if lateral is not None:
+        left[:, 2] -= by_lift * lateral[0]
+        left[:, 3] -= by_moment * lateral[1]
+    return left
 
 
 def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Observation:
@@ -249,9 +265,18 @@ def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Obs
     smooth = zero_phase(signals, sos)
     condition = flight_condition(batch, constants, options, smooth[:, Q])
     left = left_smooth = NO_LEFT
-    if options.pressure == "measured":
-        v, p = ratios_of(batch, constants, condition)
-        left = divide(signals, v, p, condition.airspeed_m_s, batch.dt_s, across_path(batch))
+    measured, lateral = options.pressure == "measured", lateral_inputs(batch, constants)
+    rolls = lateral[1].any(axis=1, keepdims=True)
+    if measured or rolls.any():
+        across = across_path(batch)
+        if measured:
+            v, p = ratios_of(batch, constants, condition)
+        else:
+            v = p = np.ones_like(across)
+            across = np.where(rolls, across, 1.0)
+        left = divide(
+            signals, v, p, condition.airspeed_m_s, batch.dt_s, across, lateral if rolls.any() else None
+        )
         smooth, left_smooth = zero_phase(signals, sos), zero_phase(left, sos)
     return Observation(
         dt_s=batch.dt_s,

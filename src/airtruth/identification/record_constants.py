@@ -14,6 +14,7 @@ import numpy as np
 from airtruth.aircraft import Aircraft
 from airtruth.errors import ConfigurationError, LogError, choices
 from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.lateral_inputs import stated_value
 from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 
@@ -108,13 +109,6 @@ def of_run(constants: AircraftConstants, metadata: Mapping[str, object], run_id:
         else RecordConstants
     )
     return kind(**{f.name: known.get(f.name, stated_value(constants, f.name)) for f in fields(kind)})
-
-
-def stated_value(constants: object, name: str) -> float:
-    """A constant of an aircraft, or of the table of constants within; 0 where it states none."""
-    within = getattr(constants, "constants", None)
-    value = getattr(constants, name, getattr(within, name, 0.0))
-    return float(value) if value is not None else 0.0
 
 
 def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> RecordConstants:

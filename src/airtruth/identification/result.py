@@ -239,7 +239,7 @@ class IdentificationResult:
         return as_figure(intervals_chart(self.to_frame(), confidence=self.estimates[0].confidence))
 
     def histories(self) -> Histories | None:
-        """Records of the logs beside the simulations by each method; None where the logs are unknown, and for the lateral motion.
+        """Records of the logs beside the simulations by each method; None where the logs are unknown.
 
         Raises
         ------
@@ -248,7 +248,7 @@ class IdentificationResult:
         """
         from airtruth.identification.simulated import simulated_records
 
-        if self.logs is None or self.settings.motion is not LONGITUDINAL:
+        if self.logs is None:
             return None
         return simulated_records(
             self.logs, self.to_frame(), self.settings.constants, taken=self.settings.sensors

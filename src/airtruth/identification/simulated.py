@@ -3,7 +3,8 @@
 The linear short period (M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2) and (3))
 is simulated from the measured elevator at the mean airspeed and density of the record. Initial state, trim and the
 offset of az are each record's own, and every method has the same of them: they enter the outputs linearly and are
-fitted by least squares, the channels weighted by their standard deviations.
+fitted by least squares, the channels weighted by their standard deviations. The lateral motion is that of
+`airtruth.identification.lateral.simulated`.
 """
 
 from __future__ import annotations
@@ -18,12 +19,19 @@ from scipy.linalg import expm
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.declared_sensors import Taken, as_ideal
 from airtruth.identification.estimates import JOINT
-from airtruth.identification.record_constants import of_run, values_of
+from airtruth.identification.lateral.simulated import simulate as simulate_lateral
+from airtruth.identification.lateral_inputs import stated_value
+from airtruth.identification.record_constants import (
+    LateralValues,
+    RecordConstants,
+    of_run,
+    values_of,
+)
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.histories import Histories, History
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.atmosphere import air_density
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
 from airtruth.physics.short_period import Scale, normal_force_row, scale, system
 
 if TYPE_CHECKING:
@@ -31,8 +39,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-OUTPUTS: Final = LONGITUDINAL.output_channels
-"""Channels that are simulated."""
 MOST_RECORDS: Final = 12
 """Largest number of records that are simulated for a report [-]; judgement: a reader looks through a dozen."""
 
@@ -127,6 +133,7 @@ def simulated_records(
     LogError, StoreError
         If a log cannot be read, or the logs lack a run of the estimates.
     """
+    motion = motion_of(estimates.columns)
     methods = tuple(dict.fromkeys(estimates["method"]))
     runs = list(dict.fromkeys(estimates["run_id"]))
     joint = runs == [JOINT]
@@ -142,7 +149,7 @@ def simulated_records(
     for _, log in named_logs(logs, run_ids=chosen):
         for run in log.run_ids:
             own = {method: rows.get((JOINT if joint else run, method)) for method in methods}
-            found[run] = _record(log, run, own, of_run(constants, log.metadata, run), taken)
+            found[run] = _record(log, run, own, of_run(constants, log.metadata, run), taken, motion)
     return Histories(tuple(found[run] for run in chosen), methods, chosen[0], of_runs or len(runs))
 
 
@@ -152,45 +159,57 @@ def _record(
     rows: dict[str, pd.Series[float] | None],
     constants: AircraftConstants,
     taken: Taken,
+    motion: Motion,
 ) -> History:
     at = log.rows(log.run_ids.index(run_id))
-    channels = {name: values[at] for name, values in log.channels.items()}
+    channels = {name: values[at].astype(np.float64) for name, values in log.channels.items()}
     t_s = log.t_s[at]
     dt = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
     if taken:
-        stacked = {name: values[None].astype(np.float64) for name, values in channels.items()}
+        stacked = {name: values[None] for name, values in channels.items()}
         ideal = as_ideal(Batch((run_id,), dt, t_s[None], stacked), taken)
         channels, t_s = {name: values[0] for name, values in ideal.channels.items()}, ideal.t_s[0]
+    batch = Batch((run_id,), dt, t_s[None], {name: values[None] for name, values in channels.items()})
+    outputs = [c for c in motion.output_channels if c in channels]
+    measured = np.stack([channels[c] for c in outputs], axis=1)
     airspeed, density = float(channels["airspeed_m_s"].mean()), float(air_density(channels).mean())
-    own = values_of(constants)
-    s = scale(own.wing_area_m2, own.chord_m, own.mass_kg, own.inertia_yy_kg_m2, airspeed, density)
-    measured = np.stack([channels[c] for c in OUTPUTS], axis=1)
-    (control,) = LONGITUDINAL.surfaces
+    own = values_of(constants, motion)
     models = {}
     for method, row in rows.items():
         y = np.full_like(measured, np.nan)
         if row is not None:
-            theta = np.array([float(row[name]) for name in LONGITUDINAL.parameters])
+            theta = np.array([float(row[name]) for name in motion.parameters])
             if (np.abs(theta) < _LARGEST).all():
-                y = simulate(theta, s, dt, channels[control], measured)
-        models[method] = {c: y[:, i] for i, c in enumerate(OUTPUTS)}
+                y = _predicted(theta, own, batch, measured)
+        models[method] = {c: y[:, i] for i, c in enumerate(outputs)}
     return History(
         run_id=run_id,
         group="",
         t_s=t_s,
-        controls_rad={control: channels[control]},
-        measured={c: channels[c] for c in OUTPUTS},
+        controls_rad={c: channels[c] for c in motion.surfaces},
+        measured={c: channels[c] for c in outputs},
         models=models,
         conditions={
             "airspeed_m_s": airspeed,
             "density_kg_m3": density,
             **({"altitude_m": float(channels["altitude_m"].mean())} if "altitude_m" in channels else {}),
             "mass_kg": own.mass_kg,
-            "inertia_yy_kg_m2": own.inertia_yy_kg_m2,
+            **{f"{name}_kg_m2": stated_value(own, f"{name}_kg_m2") for name in motion.inertias},
             "duration_s": float(t_s[-1] - t_s[0]),
             "sample_rate_hz": 1.0 / dt,
         },
     )
 
 
-__all__ = ["MOST_RECORDS", "OUTPUTS", "simulate", "simulated_records", "spaced"]
+def _predicted(theta: Array, own: RecordConstants, batch: Batch, measured: Array) -> Array:
+    """Simulation (samples, outputs) of a record of the motion of its constants."""
+    if isinstance(own, LateralValues):
+        return simulate_lateral(theta, batch, own)
+    channels = {name: values[0] for name, values in batch.channels.items()}
+    airspeed, density = float(channels["airspeed_m_s"].mean()), float(air_density(channels).mean())
+    s = scale(own.wing_area_m2, own.chord_m, own.mass_kg, own.inertia_yy_kg_m2, airspeed, density)
+    (control,) = LONGITUDINAL.surfaces
+    return simulate(theta, s, batch.dt_s, channels[control], measured)
+
+
+__all__ = ["MOST_RECORDS", "simulate", "simulated_records", "spaced"]

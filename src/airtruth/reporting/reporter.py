@@ -135,17 +135,17 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
 
 
 def _of_estimates(files: Sequence[Path], logs: Logs | None, aircraft: Aircraft | None) -> Report:
-    """The report of files of estimates, each of one motion; logs and aircraft serve that whose records are simulated."""
+    """The report of files of estimates, each of one motion; the aircraft serves the one that is compared with it."""
     from airtruth.reporting.campaign import read_estimates
     from airtruth.reporting.pages.estimates_page import estimates_report
-    from airtruth.reporting.pages.identified import read_identified, simulates
+    from airtruth.reporting.pages.identified import compares, read_identified
 
     made = []
     for file in files:
         motion = motion_of(columns_of(file))
         read_estimates(file, "`airtruth identify`", motion)
-        asked = (logs, aircraft) if len(files) == 1 or simulates(motion) else (None, None)
-        made.append(read_identified(file, *asked))
+        own = aircraft if len(files) == 1 or compares(motion) else None
+        made.append(read_identified(file, logs, own))
     name = next((record["aircraft"] for record in made[0].records.values()), "")
     return estimates_report(f"Identification of {name}" if name else files[0].stem, made)
 

@@ -115,6 +115,38 @@ def products(z: Array, x: Array, y: Array, sums: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def swept(sums: Array, coefficients: int, constants: int, least: float, made: Array) -> None:
+    """Sums of products of rows orthogonal to the free constants, from those of rows that are not: sums is changed.
+
+    Parameters
+    ----------
+    sums : (runs, signals + constants, coefficients + constants + signals) products Z and constants by Y, constants and X.
+    least : square of a constant outside those before it, over its own, from which it counts as another [-].
+    made : (runs, signals, signals + coefficients), written: Z X' and Z Y'.
+    """
+    signals = made.shape[1]
+    own = np.empty(constants)
+    for run in range(sums.shape[0]):
+        of = sums[run]
+        for i in range(constants):
+            own[i] = of[signals + i, coefficients + i]
+        for i in range(constants):
+            row, column = signals + i, coefficients + i
+            if not of[row, column] > least * own[i]:
+                continue
+            for a in range(of.shape[0]):
+                share = of[a, column] / of[row, column]
+                if a != row:
+                    for b in range(of.shape[1]):
+                        of[a, b] -= share * of[row, b]
+        for a in range(signals):
+            for b in range(signals):
+                made[run, a, b] = of[a, coefficients + constants + b]
+            for b in range(coefficients):
+                made[run, a, signals + b] = of[a, b]
+
+
+@njit(cache=True, error_model="numpy")
 def systems_of(
     theta: Array, runs: Ints, kinematics: Array, forces: Array, rates: Array, columns: Ints, made: Array
 ) -> None:
@@ -199,4 +231,14 @@ def solve(matrix: Array, right: Array, limit: float, theta: Array) -> None:
                 theta[run, i, j] = both[i, n + j] if sound and math.isfinite(both[i, n + j]) else np.nan
 
 
-__all__ = ["grow_less", "left_sides", "orthonormal", "product", "products", "remove", "solve", "systems_of"]
+__all__ = [
+    "grow_less",
+    "left_sides",
+    "orthonormal",
+    "product",
+    "products",
+    "remove",
+    "solve",
+    "swept",
+    "systems_of",
+]

@@ -24,16 +24,24 @@ from airtruth.identification.lateral.model_error import (
     with_uncertain_attack,
 )
 from airtruth.identification.lateral.observation import steady_flight
-from airtruth.identification.lateral.predictor import PROCESS, factor_names, levels, outputs_of, records_of
+from airtruth.identification.lateral.predictor import (
+    PROCESS,
+    factor_names,
+    levels,
+    outputs_of,
+    records_by_terms,
+    records_of,
+)
 from airtruth.identification.lateral.solve import regress_batch, regress_joint
 from airtruth.identification.likelihood.fit import (
     Records,
+    correlation_of,
     joint_maximum,
     maximum_of_each,
     memory_of,
-    scored,
     scored_each,
 )
+from airtruth.identification.likelihood.kalman import score
 from airtruth.identification.likelihood.method import (
     GUST_LENGTH_M,
     GUST_M_S,
@@ -59,6 +67,8 @@ PROCESS_NOISE: Final = 0.02
 _START: Final = 0.2
 """Share of its declared size from which the search of that noise starts [-]; judgement: a linear aircraft in gusts has .03 to .1
 of it, tables .1 to .7, and a search from the whole takes up to a fifth more steps."""
+_NEAR: Final = 2.0
+"""Decrease of the cost of a step that hardly changes the information of a run [-]; judgement: two standard deviations."""
 _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
 
@@ -81,6 +91,7 @@ def search_of(noise: Array, options: Options, *, gusts: bool) -> Search:
         tolerance=FilterOptions.tolerance,
         maximum_iterations=STEPS * options.maximum_iterations,
         to_prior=True,
+        near=_NEAR if gusts else 0.0,
     )
 
 
@@ -111,23 +122,30 @@ def estimate(
     parts = []
     for part in chunks(batch):
         start = regress_batch(part, values, "ls", None, replace(options, covariance="none"))
-        data = records_of(part, values, options, GUST_LENGTH_M, gusts=gusts)
+        choices = (options.terms, TERMS) if gusts else (options.terms,)
+        data, *others = records_by_terms(part, values, options, GUST_LENGTH_M, choices, gusts=gusts)
         search = search_of(_noise(part, constants), options, gusts=gusts)
         maxima = maximum_of_each(data, _start(start.theta, search, gusts=gusts), search)
-        memory = memory_of(data, maxima.z)
         known = np.flatnonzero(np.isfinite(maxima.z).all(axis=1))
-        if gusts and known.size:
-            more = records_of(part, values, replace(options, terms=TERMS), GUST_LENGTH_M, gusts=gusts)
+        if not gusts or not known.size:
+            memory = memory_of(data, maxima.z)
+        else:
+            more = others[0]
             random = random_terms(options, search.weight.size)
             z = random.point(maxima.z[known])
-            score = scored(more, z, known, np.arange(z.shape[1]))
+            made = score(more.layout, known, z, np.arange(z.shape[1]), more.signals, more.dt_s)
+            # the random factors are zero here, so that the innovations are those of the fit
+            memory = np.full(len(maxima.z), np.nan)
+            memory[known] = correlation_of(made.innovations)
             moved = with_uncertain_attack(
-                with_random_terms(maxima.of(known), score, search.weight, random),
+                with_random_terms(
+                    maxima.of(known), (made.cost, made.gradient, made.information), search.weight, random
+                ),
                 steady_flight(part, options).variance[known],
             )
             maxima.z[known], maxima.covariance[known] = moved.z, moved.covariance
-        made = _estimates(maxima, part.run_ids, data.scale, options, gusts=gusts)
-        parts.append(replace(made, memory=memory))
+        answer = _estimates(maxima, part.run_ids, data.scale, options, gusts=gusts)
+        parts.append(replace(answer, memory=memory))
     return concatenated(parts, batch.run_ids)
 
 

@@ -101,21 +101,21 @@ def with_random_terms(maxima: Maxima, score: Scored, weight: Array, random: Rand
     _, gradient, likelihood = score
     full = normal_equations.scaled_inverse(likelihood + np.diag(random.point(weight[None])[0]), RIDGE)
     z, covariance, every = maxima.z.copy(), maxima.covariance.copy(), random.point(maxima.z)
+    pairs = product(np.exp(2.0 * LOG_SPREADS), repeat=2)
+    squares = np.array([np.where(random.of_attack, *pair) for pair in pairs])
+    diagonal = np.arange(random.factors.size)
     for group, inverse in enumerate(full):
         by_factors = inverse[:, random.factors]
         free = -by_factors @ gradient[group, random.factors]
-        size = _sizes(maxima.z[group, _OWN])[random.derivatives]
-        spread = np.stack(
-            [size * np.where(random.of_attack, *pair) for pair in product(np.exp(LOG_SPREADS), repeat=2)]
-        )
-        inner = by_factors[random.factors] + spread[:, None] ** 2 * np.eye(size.size)
+        inner = np.repeat(by_factors[random.factors][None], len(squares), axis=0)
+        inner[:, diagonal, diagonal] += squares * _sizes(maxima.z[group, _OWN])[random.derivatives] ** 2
         precision = np.linalg.inv(inner)
         pull = precision @ free[random.factors]
         logarithm = -0.5 * (np.linalg.slogdet(inner)[1] + pull @ free[random.factors])
         share = np.exp(logarithm - logarithm.max())
         share /= share.sum()
         mean = share @ pull
-        less = np.tensordot(share, precision, 1) - np.einsum("k,ki,kj->ij", share, pull - mean, pull - mean)
+        less = np.tensordot(share, precision, 1) - (share[:, None] * (pull - mean)).T @ (pull - mean)
         every[group] += free - by_factors @ mean
         derivatives = by_factors[_OWN]
         covariance[group, _OWN, _OWN] = inverse[_OWN, _OWN] - derivatives @ less @ derivatives.T

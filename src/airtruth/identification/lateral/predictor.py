@@ -12,7 +12,7 @@ Sources: V. Klein and E. A. Morelli, Aircraft System Identification, AIAA, 2006,
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
@@ -205,11 +205,11 @@ def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Opt
     return np.stack(made, axis=2)
 
 
-def term_inputs(batch: Batch, known: Known, options: Options, attack: Array) -> Array:
+def term_inputs(batch: Batch, known: Known, terms: Collection[str], attack: Array) -> Array:
     """Nonlinear terms (runs, samples, terms) of the signals about their first samples, at an angle of attack (runs,) [rad]."""
     signals = _signals(batch, known)
-    terms = nonlinear(signals - signals[..., :1], change_of_attack(batch, attack), options.terms)
-    return np.swapaxes(terms, 1, 2)
+    made = nonlinear(signals - signals[..., :1], change_of_attack(batch, attack), terms)
+    return np.swapaxes(made, 1, 2)
 
 
 def records_of(
@@ -221,7 +221,23 @@ def records_of(
     gusts: bool,
     attack: float | None = None,
 ) -> Records[LateralScale]:
-    """Signals and predictor of a batch; nothing is checked. Outputs are the channels that the log has.
+    """Signals and predictor of a batch, one entry of `records_by_terms`."""
+    return records_by_terms(batch, constants, options, length_m, [options.terms], gusts=gusts, attack=attack)[
+        0
+    ]
+
+
+def records_by_terms(
+    batch: Batch,
+    constants: LateralConstants,
+    options: Options,
+    length_m: float,
+    choices: Sequence[Collection[str]],
+    *,
+    gusts: bool,
+    attack: float | None = None,
+) -> list[Records[LateralScale]]:
+    """Signals and predictors of a batch; nothing is checked. Outputs are the channels that the log has.
 
     Surfaces between samples have the area of the cubic through the four nearest samples, and the corners of a first-order
     servo behind a held command where the record shows one (`airtruth.numerics.intersample`).
@@ -229,6 +245,7 @@ def records_of(
     Parameters
     ----------
     length_m : scale length of the gust [m]; gusts : as in `predictor_of`.
+    choices : nonlinear terms of each entry of the result; those of the options have no effect.
     attack : angle of attack at which the derivatives hold [rad], where terms make them depend on it; None for the steady one of
         each run.
     """
@@ -244,18 +261,22 @@ def records_of(
     measured = options.pressure != "constant" and options.airspeed_m_s is None
     if measured:
         u.append(surplus_inputs(batch, scale, known, options))
-    u.append(term_inputs(batch, known, options, at))
-    inputs = np.concatenate(u, axis=2)
-    edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
-    bend = np.zeros_like(inputs)
-    bend[:, 1:] = (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
-    for number, name in enumerate(CONTROLS):
-        bend[:, :, number] += servo_bend(batch.channels[name])
-    predictor = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured, terms=options.terms)
+    corners = [servo_bend(batch.channels[name]) for name in CONTROLS]
     floor = _FLOOR * y.std(axis=1)
     least = tuple(Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs))
-    made = Predictor(**{**vars(predictor), "terms": (*predictor.terms, *least)})
-    return Records(batch.dt_s, KalmanSignals(y - y[:, :1], inputs, bend), layout(made, y.shape[0]), scale)
+    y = y - y[:, :1]
+    made = []
+    for terms in choices:
+        inputs = np.concatenate([*u, term_inputs(batch, known, terms, at)], axis=2)
+        edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
+        bend = np.zeros_like(inputs)
+        bend[:, 1:] = (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
+        for number, corner in enumerate(corners):
+            bend[:, :, number] += corner
+        own = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured, terms=terms)
+        own = Predictor(**{**vars(own), "terms": (*own.terms, *least)})
+        made.append(Records(batch.dt_s, KalmanSignals(y, inputs, bend), layout(own, y.shape[0]), scale))
+    return made
 
 
 def outputs_of(batch: Batch) -> tuple[str, ...]:
@@ -263,4 +284,14 @@ def outputs_of(batch: Batch) -> tuple[str, ...]:
     return tuple(output.name for output in LATERAL.outputs if output.channel in batch.channels)
 
 
-__all__ = ["GUST", "OUTPUTS", "PROCESS", "factor_names", "levels", "outputs_of", "predictor_of", "records_of"]
+__all__ = [
+    "GUST",
+    "OUTPUTS",
+    "PROCESS",
+    "factor_names",
+    "levels",
+    "outputs_of",
+    "predictor_of",
+    "records_by_terms",
+    "records_of",
+]

@@ -18,7 +18,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.lateral.kernels import grow_less, orthonormal, products, remove, systems_of
+from airtruth.identification.lateral.kernels import (
+    grow_less,
+    orthonormal,
+    products,
+    remove,
+    swept,
+    systems_of,
+)
 from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
 from airtruth.identification.lateral.responses import LANES, Driven, filter_rows, respond, response_sums
 from airtruth.identification.options import Options
@@ -226,15 +233,9 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
 
     def moments(theta: Array, active: Ints) -> Array:
         _, sums = filtered(theta, active, 1)
-        places = [(z.size + i, coefficients + i) for i in range(count)]
-        least = [_INDEPENDENT * sums[:, row, column] for row, column in places]
-        for (row, column), limit in zip(places, least, strict=True):  # constants are swept out one by one
-            pivot = sums[:, row, column]
-            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > limit)
-            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, row]
-        return np.concatenate(
-            [sums[:, : z.size, coefficients + count :], sums[:, : z.size, :coefficients]], axis=2
-        )
+        made = np.empty((active.size, z.size, z.size + coefficients))
+        swept(sums, coefficients, count, _INDEPENDENT, made)
+        return made
 
     return LateralProblem(at, moments, model.bounded, runs)
 

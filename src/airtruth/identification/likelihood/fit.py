@@ -163,8 +163,8 @@ def _search(options: FilterOptions, levels: Array) -> Search:
 def maximum_of_each(data: Records[S], start: Array, search: Search) -> Maxima:
     """Maximum of the likelihood of each run, from its start (runs, derivatives)."""
 
-    def evaluate(z: Array, active: Ints) -> Scored:
-        return scored(data, z, active, search.free)
+    def evaluate(z: Array, active: Ints, informed: bool) -> Scored:
+        return scored(data, z, active, search.free, informed=informed)
 
     return maximise(evaluate, start, search)
 
@@ -172,19 +172,19 @@ def maximum_of_each(data: Records[S], start: Array, search: Search) -> Maxima:
 def joint_maximum(data: Sequence[Records[S]], start: Array, search: Search) -> Maxima:
     """Maximum of the likelihood of all runs, which share derivatives and levels, from a start (derivatives,)."""
 
-    def evaluate(z: Array, active: Ints) -> Scored:
-        cost, gradient, information = scored_each(data, z, search.free)
+    def evaluate(z: Array, active: Ints, informed: bool) -> Scored:
+        cost, gradient, information = scored_each(data, z, search.free, informed=informed)
         return cost.sum(keepdims=True), gradient.sum(axis=0)[None], information.sum(axis=0)[None]
 
     return maximise(evaluate, start[None, :], search)
 
 
-def scored_each(data: Sequence[Records[S]], z: Array, free: Ints) -> Scored:
+def scored_each(data: Sequence[Records[S]], z: Array, free: Ints, *, informed: bool = True) -> Scored:
     """`scored` for all runs of several batches at one point z (1, parameters)."""
     made = []
     for part in data:
         runs = part.signals.y.shape[0]
-        made.append(scored(part, np.repeat(z, runs, axis=0), np.arange(runs), free))
+        made.append(scored(part, np.repeat(z, runs, axis=0), np.arange(runs), free, informed=informed))
     cost, gradient, information = (np.concatenate(parts) for parts in zip(*made, strict=True))
     return cost, gradient, information
 
@@ -200,26 +200,33 @@ def memory_of(data: Records[S], z: Array) -> Array:
     known = np.flatnonzero(np.isfinite(z).any(axis=1))
     # a level of zero has no logarithm
     free = np.empty(0, dtype=np.int64)
-    e = score(data.layout, known, z[known], free, data.signals, data.dt_s).innovations
-    with np.errstate(invalid="ignore"):
-        product = (e[:, 1:] * e[:, :-1]).mean(axis=1) / (e * e).mean(axis=1)
-    result[known] = product.max(axis=1)
+    made = score(data.layout, known, z[known], free, data.signals, data.dt_s)
+    result[known] = correlation_of(made.innovations)
     return result
 
 
-def scored(data: Records[S], z: Array, active: Ints, free: Ints) -> Scored:
+def correlation_of(innovations: Array) -> Array:
+    """(runs,) largest correlation of neighbouring innovations (runs, samples, outputs) of an output [-]."""
+    e = innovations
+    with np.errstate(invalid="ignore"):
+        product = (e[:, 1:] * e[:, :-1]).mean(axis=1) / (e * e).mean(axis=1)
+    return np.asarray(product.max(axis=1))
+
+
+def scored(data: Records[S], z: Array, active: Ints, free: Ints, *, informed: bool = True) -> Scored:
     """Negative log-likelihood, gradient and information of the runs ``active``, no prior.
 
     Parameters
     ----------
     z : (active, parameters) derivatives, then logarithms of the levels.
     active, free : runs; parameters to differentiate for.
+    informed : whether the information is wanted; NaN otherwise.
 
     Returns
     -------
     (active,), (active, free), (active, free, free).
     """
-    made = score(data.layout, active, z, free, data.signals, data.dt_s)
+    made = score(data.layout, active, z, free, data.signals, data.dt_s, informed=informed)
     return made.cost, made.gradient, made.information
 
 

@@ -24,17 +24,19 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.identification.likelihood.filter_slopes import closed_loop, differentiated, transposed
 from airtruth.identification.likelihood.kalman_kernel import (
     Drive,
     Filter,
     KalmanSignals,
+    costates,
     drive_of,
     predict,
     propagate,
 )
 from airtruth.identification.likelihood.linearise import Matrices, matrices, slopes
 from airtruth.identification.likelihood.predictor import LevelLayout
-from airtruth.numerics.discretise import DOUBLINGS, riccati, whitener
+from airtruth.numerics.discretise import riccati, whitener
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,8 +44,6 @@ Bools = NDArray[np.bool_]
 
 BLOCK_SAMPLES: Final = 4000
 """Samples of the runs that are filtered together [-]; judgement: their innovations stay in the processor's cache."""
-FADED: Final = 1e-9
-"""Largest element of a power of the closed loop that counts as zero [-]; judgement: its square is below rounding."""
 RIDGE: Final = 1e-13
 """Added to the unit diagonal of the normal equations of initial means and biases [-]; judgement: an output without
 memory of the start leaves its mean undetermined."""
@@ -56,7 +56,7 @@ class LikelihoodScore(NamedTuple):
     ----------
     cost : (runs,) J; infinite where it cannot be evaluated.
     gradient : (runs, free) of J; 0 where it cannot be evaluated.
-    information : (runs, free, free) Fisher information with means and biases free.
+    information : (runs, free, free) Fisher information with means and biases free; NaN where it was not asked for.
     innovations : (runs, samples, outputs) whitened: of unit covariance.
     """
 
@@ -77,7 +77,14 @@ class _Profile(NamedTuple):
 
 
 def score(
-    layout: LevelLayout, runs: Ints, z: Array, free: Ints, signals: KalmanSignals, dt_s: float
+    layout: LevelLayout,
+    runs: Ints,
+    z: Array,
+    free: Ints,
+    signals: KalmanSignals,
+    dt_s: float,
+    *,
+    informed: bool = True,
 ) -> LikelihoodScore:
     """J of runs with its gradient and information.
 
@@ -91,19 +98,20 @@ def score(
     free : indices of the parameters to differentiate for.
     signals : records of all runs.
     dt_s : sample period [s].
+    informed : whether the information is wanted; the gradient alone takes half of the time.
     """
     samples, outputs = signals.y.shape[1:]
     result = LikelihoodScore(
         np.full(runs.size, np.inf),
         np.zeros((runs.size, free.size)),
-        np.zeros((runs.size, free.size, free.size)),
+        np.full((runs.size, free.size, free.size), 0.0 if informed else np.nan),
         np.zeros((runs.size, samples, outputs)),
     )
     size = max(1, BLOCK_SAMPLES // samples)
     with np.errstate(over="ignore", invalid="ignore"):
         for first in range(0, runs.size, size):
             block = np.arange(first, min(first + size, runs.size))
-            _score_block(layout, runs[block], z[block], free, signals, dt_s, block, result)
+            _score_block(layout, runs[block], z[block], free, signals, dt_s, block, result, informed)
     return result
 
 
@@ -116,6 +124,7 @@ def _score_block(
     dt_s: float,
     block: Ints,
     result: LikelihoodScore,
+    informed: bool,
 ) -> None:
     """Fill the rows ``block`` of the result where J can be evaluated."""
     steady, good = _steady(matrices(layout, runs, z, dt_s))
@@ -141,11 +150,21 @@ def _score_block(
     acts = np.isin(free, layout.location[layout.location[:, 0] == 0, 3:])
     order = np.argsort(~acts, kind="stable")
     moved = slopes(layout, runs, z, free[order], dt_s)
-    d_white, d_gain_p = _differentiated(steady, moved)
-    sums = _sums(steady, moved, d_gain_p, int(acts.sum()), base, least, drive)
-    gradient, information = _scored(sums, d_white, least, samples)
-    result.gradient[block[:, None], order] = gradient
-    result.information[block[:, None, None], order[:, None], order] = information
+    d_white, d_gain_p = differentiated(steady, moved)
+    r = least.residual.reshape(-1, samples, m)
+    path = _Path(*_predicted(steady, drive, least.nuisance), drive.u, r)
+    unit = _per_unit(steady, moved, d_gain_p, int(acts.sum()))
+    flat = d_white.reshape(*d_white.shape[:2], m * m)
+    if informed:
+        slope, information = _sums(steady, unit, base, least, path)
+        result.information[block[:, None, None], order[:, None], order] = information + 0.5 * samples * (
+            np.matmul(flat, transposed(flat))
+        )
+    else:
+        slope = _slope(steady, unit, path)
+    spread = samples * np.eye(m) - np.matmul(transposed(r), r)
+    more = 0.5 * np.matmul(flat, spread.reshape(-1, m * m, 1))[:, :, 0]
+    result.gradient[block[:, None], order] = slope + more
 
 
 def _innovations(steady: Filter, drive: Drive) -> Array:
@@ -162,10 +181,10 @@ def _innovations(steady: Filter, drive: Drive) -> Array:
     n = steady.p.shape[1]
     _, errors = _predicted(steady, drive, np.zeros((runs, n + m)))
     made = np.empty((runs, samples * m, 1 + n + m))
-    made[:, :, 0] = np.matmul(errors, _t(steady.white)).reshape(runs, -1)
+    made[:, :, 0] = np.matmul(errors, transposed(steady.white)).reshape(runs, -1)
     unit = np.broadcast_to(np.eye(m), (runs, m, m))
     still = np.broadcast_to(np.eye(m, n + m, n), (runs, m, n + m))
-    power = np.concatenate([np.concatenate([_closed(steady), -steady.gain_p], axis=2), still], axis=1)
+    power = np.concatenate([np.concatenate([closed_loop(steady), -steady.gain_p], axis=2), still], axis=1)
     own = made[:, :, 1:]
     own[:, :m] = -np.matmul(steady.white, np.concatenate([steady.step.c, unit], axis=2))
     done = 1
@@ -184,58 +203,72 @@ def _predicted(steady: Filter, drive: Drive, nuisance: Array) -> tuple[Array, Ar
     return states, errors
 
 
-def _closed(steady: Filter) -> Array:
-    """phi - phi K C (runs, states, states)."""
-    return np.asarray(steady.step.phi - np.matmul(steady.gain_p, steady.step.c))
+class _Path(NamedTuple):
+    """Trajectory of the estimated means and biases: states, innovations, inputs, whitened innovations, (runs, samples, ...)."""
+
+    states: Array
+    errors: Array
+    inputs: Array
+    white: Array
 
 
-class _TangentSums(NamedTuple):
-    """Sums of products of the derivatives of the whitened innovations with respect to the free parameters.
+class _PerUnit(NamedTuple):
+    """Effects of the free parameters per unit of each signal.
 
     Attributes
     ----------
-    own : (runs, free, free) with one another.
-    across : (runs, free, states + outputs) with those with respect to means and biases.
-    slope : (runs, free) with the innovations.
+    state : (runs, states + 3 inputs + outputs, states first) to the prediction, of the parameters that move more than the gain.
+    error : (runs, outputs, states others) to the prediction, of the others.
+    output : (runs, states + inputs, outputs first) to the whitened innovation.
     """
 
-    own: Array
-    across: Array
-    slope: Array
+    state: Array
+    error: Array
+    output: Array
 
 
-def _sums(
-    steady: Filter,
-    moved: Matrices,
-    d_gain_p: Array,
-    acting: int,
-    base: Array,
-    least: _Profile,
-    drive: Drive,
-) -> _TangentSums:
-    """Sums over the derivatives along the trajectory of the estimated means and biases.
-
-    Parameters
-    ----------
-    steady : filters.
-    moved, d_gain_p : derivatives of their step and of phi K, (runs, free, ...).
-    acting : number of parameters that move more than the gain; they come first.
-    base, least : of `_innovations` and `_profile`; drive : of `drive_of`.
-    """
-    runs, samples, m = drive.shown.shape
-    n, count = steady.p.shape[1], d_gain_p.shape[1]
-    inputs = drive.u.shape[2] // 3
-    states, errors = _predicted(steady, drive, least.nuisance)
-    # what a parameter adds to the prediction and to the innovation, per unit of each signal
+def _per_unit(steady: Filter, moved: Matrices, d_gain_p: Array, acting: int) -> _PerUnit:
+    """Effects of parameters from derivatives of the step and of phi K, (runs, free, ...); the first ``acting`` move the model."""
     own = Matrices(*(part[:, :acting] for part in moved))
-    gain_p, white = steady.gain_p[:, None], -steady.white
+    gain_p, white = steady.gain_p[:, None], -steady.white[:, None]
     adds = [own.phi - gain_p @ own.c, -gain_p @ own.d, own.early, own.late, d_gain_p[:, :acting]]
-    shows = [white[:, None] @ own.c, white[:, None] @ own.d]
-    per_unit, per_output = _last(np.concatenate(adds, axis=3)), _last(np.concatenate(shows, axis=3))
-    per_error = _last(d_gain_p[:, acting:])
+    shows = [white @ own.c, white @ own.d]
+    return _PerUnit(
+        _last(np.concatenate(adds, axis=3)),
+        _last(d_gain_p[:, acting:]),
+        _last(np.concatenate(shows, axis=3)),
+    )
+
+
+def _slope(steady: Filter, unit: _PerUnit, path: _Path) -> Array:
+    """Slopes (runs, free) of half the sum of squares of the innovations, by the adjoint of the differentiated filter.
+
+    The innovations are stationary in the means and biases, so that these do not enter.
+    """
+    behind = np.empty_like(path.states)
+    costates(closed_loop(steady), -np.matmul(steady.white, steady.step.c), path.white, behind)
+    runs = len(behind)
+    inputs, m = path.inputs.shape[2] // 3, path.white.shape[2]
+    drives = (path.states, path.inputs, path.errors)
+    by_state = np.concatenate([np.matmul(transposed(part), behind) for part in drives], axis=1)
+    by_output = np.concatenate(
+        [np.matmul(transposed(part), path.white) for part in (path.states, path.inputs[..., :inputs])], axis=1
+    )
+    slopes = []
+    for each, by in ((unit.state, by_state), (unit.output, by_output), (unit.error, by_state[:, -m:])):
+        slopes.append(np.matmul(by.reshape(runs, 1, -1), each.reshape(runs, by[0].size, -1))[:, 0])
+    return np.concatenate([slopes[0] + slopes[1], slopes[2]], axis=1)
+
+
+def _sums(steady: Filter, unit: _PerUnit, base: Array, least: _Profile, path: _Path) -> tuple[Array, Array]:
+    """Slopes (runs, free) of half the sum of squares of the innovations, and their information with means and biases free."""
+    runs, samples, m = path.errors.shape
+    n = steady.p.shape[1]
+    acting, others = unit.state.shape[2] // n, unit.error.shape[2] // n
+    count, inputs = acting + others, path.inputs.shape[2] // 3
     closed, seen = (
         np.concatenate([part, np.zeros((*part.shape[:2], -n % 3))], axis=2)
-        for part in (_closed(steady), np.matmul(white, steady.step.c))
+        for part in (closed_loop(steady), -np.matmul(steady.white, steady.step.c))
     )
     width = 1 + n + m
     sums = np.empty((runs, count + width, count + width))
@@ -244,17 +277,21 @@ def _sums(
     # one run after another, so that these arrays stay in the processor's cache
     driving = np.empty((samples, n + 3 * inputs + m))
     driven, shown = np.empty((samples, n * acting)), np.empty((samples, m * acting))
-    by_error = np.empty((samples, n * (count - acting)))
+    by_error = np.empty((samples, n * others))
     for run in range(runs):
-        driving[:, :n], driving[:, n:-m], driving[:, -m:] = states[run], drive.u[run], errors[run]
-        np.matmul(driving, per_unit[run], out=driven)
-        np.matmul(driving[:, : n + inputs], per_output[run], out=shown)
-        np.matmul(errors[run], per_error[run], out=by_error)
+        driving[:, :n], driving[:, n:-m], driving[:, -m:] = (
+            path.states[run],
+            path.inputs[run],
+            path.errors[run],
+        )
+        np.matmul(driving, unit.state[run], out=driven)
+        np.matmul(driving[:, : n + inputs], unit.output[run], out=shown)
+        np.matmul(path.errors[run], unit.error[run], out=by_error)
         propagate(
             closed[run],
             seen[run],
             driven.reshape(samples, n, acting),
-            by_error.reshape(samples, n, count - acting),
+            by_error.reshape(samples, n, others),
             shown.reshape(samples, m, acting),
             both,
         )
@@ -263,7 +300,9 @@ def _sums(
     across = sums[:, :count, count:]
     at = np.concatenate([np.ones((runs, 1)), least.nuisance], axis=1)
     slope = np.matmul(across, at[:, :, None])[:, :, 0]
-    return _TangentSums(sums[:, :count, :count], across[:, :, 1:], slope)
+    scaled = across[:, :, 1:] / least.size[:, None, :]
+    explained = np.matmul(scaled, np.linalg.solve(least.normal, transposed(scaled)))
+    return slope, sums[:, :count, :count] - explained
 
 
 def _last(slopes: Array) -> Array:
@@ -313,70 +352,3 @@ def _profile(base: Array, gram: Array, precision: Array, logdet: Array) -> _Prof
     prior = np.matmul(np.matmul(means, precision), np.swapaxes(means, 1, 2))[:, 0, 0]
     cost = 0.5 * (logdet + np.einsum("rk,rk->r", residual, residual) + prior)
     return _Profile(cost, nuisance, normal, size, residual)
-
-
-def _differentiated(steady: Filter, moved: Matrices) -> tuple[Array, Array]:
-    """Derivatives W dS W' (runs, free, outputs, outputs) and of phi K (runs, free, states, outputs)."""
-    phi, c = steady.step.phi[:, None], steady.step.c[:, None]
-    p, white, gain = steady.p[:, None], steady.white[:, None], steady.gain[:, None]
-    n = phi.shape[-1]
-    keep = np.eye(n) - gain @ c
-    pc = p @ _t(c)
-    filtered = p - gain @ _t(pc)
-    # the gain is stationary for the filtered covariance: its derivative does not enter here
-    half = gain @ moved.c @ (p @ _t(keep))
-    inner = (gain * moved.variance[:, :, None, :]) @ _t(gain) - half - _t(half)
-    shift = moved.phi @ (filtered @ _t(phi))
-    d_p = phi @ inner @ _t(phi) + shift + _t(shift) + moved.noise
-    d_p = _lyapunov(
-        steady.step.phi - steady.gain_p @ steady.step.c, d_p, np.asarray(steady.p.any(axis=(1, 2)))
-    )
-    cross = moved.c @ pc
-    d_s = cross + _t(cross) + c @ d_p @ _t(c)
-    outputs = np.arange(d_s.shape[-1])
-    d_s[..., outputs, outputs] += moved.variance
-    slope = d_p @ _t(c) + p @ _t(moved.c) - gain @ d_s
-    return white @ d_s @ _t(white), moved.phi @ gain + phi @ (slope @ (_t(white) @ white))
-
-
-def _t(matrix: Array) -> Array:
-    return np.swapaxes(matrix, -1, -2)
-
-
-def _lyapunov(closed: Array, x: Array, filtering: Bools) -> Array:
-    """Solution of X = F X F' + x by doubling.
-
-    Parameters
-    ----------
-    closed : (runs, n, n) F.
-    x : (runs, free, n, n) symmetric.
-    filtering : (runs,) False where P = 0: nothing is filtered and X = x.
-    """
-    runs, count, n, _ = x.shape
-    power = np.where(filtering[:, None, None], closed, 0.0)
-    powers = []
-    for _ in range(DOUBLINGS):
-        powers.append(power)
-        going = np.abs(power).max(axis=(1, 2)) > FADED
-        if not going.any():
-            break
-        power = np.where(going[:, None, None], power @ power, 0.0)
-    total = np.ascontiguousarray(
-        np.swapaxes(x, 1, 2)
-    )  # (runs, n, free, n): a product for all parameters at once
-    for part in powers:
-        left = np.matmul(part, total.reshape(runs, n, count * n)).reshape(runs, n * count, n)
-        total += np.matmul(left, _t(part)).reshape(runs, n, count, n)
-    return np.swapaxes(total, 1, 2)
-
-
-def _scored(sums: _TangentSums, d_white: Array, least: _Profile, samples: int) -> tuple[Array, Array]:
-    """Gradient (runs, free) and information (runs, free, free) of J."""
-    runs, count, m, _ = d_white.shape
-    across = sums.across / least.size[:, None, :]
-    explained = np.matmul(across, np.linalg.solve(least.normal, _t(across)))
-    flat = d_white.reshape(runs, count, m * m)
-    information = sums.own - explained + 0.5 * samples * np.matmul(flat, _t(flat))
-    r = least.residual.reshape(runs, samples, m)
-    spread = samples * np.eye(m) - np.matmul(_t(r), r)
-    return sums.slope + 0.5 * np.matmul(flat, spread.reshape(runs, m * m, 1))[:, :, 0], information

@@ -174,3 +174,30 @@ def propagate(
                 to[first + f] = other[f]
             _add(closed[i], x, to)
         x, following = following, x
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def costates(closed: Array, seen: Array, white: Array, behind: Array) -> None:
+    """Slope of half the sum of squares of the whitened innovations with respect to what is added to each prediction.
+
+    l = F' l+ + H' e, with l+ = 0 behind the last sample: the adjoint of `propagate`.
+
+    Parameters
+    ----------
+    closed, seen : (runs, states, states) F and (runs, outputs, states) H, whitened.
+    white : (runs, samples, outputs) e.
+    behind : (runs, samples, states), written: l+ at each sample.
+    """
+    runs, samples, m = white.shape
+    n = closed.shape[1]
+    for run in range(runs):
+        for i in range(n):
+            behind[run, samples - 1, i] = 0.0
+        for k in range(samples - 1, 0, -1):
+            for i in range(n):
+                total = 0.0
+                for h in range(n):
+                    total += closed[run, h, i] * behind[run, k, h]
+                for a in range(m):
+                    total += seen[run, a, i] * white[run, k, a]
+                behind[run, k - 1, i] = total

@@ -4,7 +4,8 @@ With v = V(t)/V0 and p = q_bar(t)/q_bar0 the ratios to the reference condition o
 of eqs (2), (3) act on alpha and the elevator p times, on the rate p/v times; the lift turns the path by
 1/v of that. The surplus over the reference, such as (p - 1) alpha, is made of measured signals and enters
 like the elevator; its noise is that of the sensors times a few percent. Filter and gain stay those of the
-reference condition. Gravity across a path that turns, (g/V) cos(gamma), is a known input as well. Left out is
+reference condition. Gravity across a path that turns, (g/V) cos(gamma), is a known input as well, and in records of both
+motions the lateral one (`airtruth.identification.lateral_inputs`). Left out is
 gamma V'/V, by which a changing airspeed turns a path that is not level.
 
 Source: M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2), (3).
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants, across_path, ratios_of
+from airtruth.identification.lateral_inputs import lateral_inputs
 from airtruth.identification.likelihood.predictor import Predictor, Term, extended
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import Scale
@@ -40,10 +42,12 @@ INPUTS: Final = (
 )
 """Measured alpha, q and elevator times the surplus: in alpha_dot, in q_dot and az; the surplus itself,
 by which the lift of the trimmed aircraft grows; and the change of gravity across the path."""
+LATERAL_INPUTS: Final = ("lateral_alpha", "lateral_q")
+"""Parts of alpha_dot and q_dot that the lateral motion causes, in records of both motions."""
 
 
 def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
-    """Inputs `INPUTS`, (runs, samples, inputs).
+    """Inputs `INPUTS`, and `LATERAL_INPUTS` where a run has lateral motion, (runs, samples, inputs).
 
     alpha, q and the elevator are taken relative to their means over the record, to which the lift at
     p = 1 in `with_pressure` belongs.
@@ -63,7 +67,8 @@ def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
     moment = (force * alpha, path * q, force * elevator, force)
     across = across_path(batch)
     gravity = (across - across.mean(axis=1, keepdims=True)) / v
-    return np.stack([*lift, *moment, gravity], axis=2)
+    lateral = lateral_inputs(batch, constants)
+    return np.stack([*lift, *moment, gravity, *(lateral if lateral[1].any() else ())], axis=2)
 
 
 def with_pressure(
@@ -96,7 +101,10 @@ def with_pressure(
             Term("B", "alpha", "lift_trim", az / scale.airspeed_m_s),
             Term("D", "az", "normal_trim", az),
         ]
-    return extended(predictor, terms, inputs=INPUTS)
+    if not lateral_inputs(batch, constants)[1].any():
+        return extended(predictor, terms, inputs=INPUTS)
+    terms += [Term("B", row, name, 1.0) for row, name in zip(("alpha", "q"), LATERAL_INPUTS, strict=True)]
+    return extended(predictor, terms, inputs=(*INPUTS, *LATERAL_INPUTS))
 
 
 def with_trim_moment(predictor: Predictor, scale: Scale) -> Predictor:

@@ -135,7 +135,7 @@ def repeat(
             status[active[np.isfinite(largest) & ~sound]] = Status.DIVERGED
         status[active[converged]] = Status.CONVERGED
         active = active[sound & ~converged]
-    lost = ~np.isin(status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS))
+    lost = (status != Status.CONVERGED) & (status != Status.MAXIMUM_ITERATIONS)
     theta[lost] = np.nan
     return IterationOutcome(theta, status, iterations)
 

@@ -18,7 +18,7 @@ from airtruth.reporting.campaign import FlownCampaign, Parted
 from airtruth.reporting.pages.estimates_page import shifts_of
 from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
 from airtruth.reporting.pages.headline import headline
-from airtruth.reporting.pages.identified import SIMULATED, Identified, read_identified, simulates
+from airtruth.reporting.pages.identified import SIMULATED, Identified, compares, read_identified
 from airtruth.reporting.pages.motions import PagePart, report_of
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table
@@ -49,12 +49,12 @@ def campaign_report(
     ----------
     campaigns : the campaign with the estimates of each motion.
     logs : logs of the campaign; None for those in its folder.
-    aircraft : the declared aircraft; None for none. It and ``logs`` serve the motion whose records are simulated.
+    aircraft : the declared aircraft; None for none. It is compared with the longitudinal motion.
     """
     parts = {}
     for one in campaigns:
-        asked = (logs, aircraft) if len(campaigns) == 1 or simulates(one.motion) else (None, None)
-        parts[one.motion.name] = _part(one, *asked)
+        own = aircraft if len(campaigns) == 1 or compares(one.motion) else None
+        parts[one.motion.name] = _part(one, logs, own)
     return report_of(campaigns[0].title or campaigns[0].name, parts)
 
 
@@ -84,7 +84,7 @@ def _part(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> Pag
         motion,
     )
     sections = (
-        records_section(histories, identified.reason, SIMULATED),
+        records_section(histories, identified.reason, SIMULATED[motion.name]),
         Section(
             "Estimates against the truth",
             "tables",

@@ -18,13 +18,12 @@ from airtruth.identification.stored import Record
 from airtruth.physics.motion import motion_of
 from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
 from airtruth.reporting.pages.identified import (
-    NOT_SIMULATED,
     SIMULATED,
     Identified,
     answer_of,
-    refuse_records,
+    compares,
+    refuse_declared,
     require_same_aircraft,
-    simulates,
 )
 from airtruth.reporting.pages.motions import PagePart, report_of
 from airtruth.reporting.pages.origin import of_methods, origin_section
@@ -83,7 +82,7 @@ def _part(identified: Identified) -> PagePart:
         else correlation_section(scattered_correlations(frame), _OVER_RUNS, motion)
     )
     sections = (
-        records_section(histories, identified.reason, SIMULATED),
+        records_section(histories, identified.reason, SIMULATED[motion.name]),
         Section("Estimates of all methods", "estimates", data_table(table, "estimates")),
         shift_section,
         runs_drawn,
@@ -121,13 +120,13 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
 
     Parameters
     ----------
-    aircraft : the declared aircraft, beside the estimates of the motion whose records are simulated; None for none.
+    aircraft : the declared aircraft, beside the estimates of the motion that is compared with it; None for none.
     """
     every = tuple(result.motions.values())
     return estimates_report(
         f"Identification of {result.settings.aircraft}",
         [
-            _identified(one, aircraft if len(every) == 1 or simulates(one.settings.motion) else None)
+            _identified(one, aircraft if len(every) == 1 or compares(one.settings.motion) else None)
             for one in every
         ],
     )
@@ -143,7 +142,7 @@ def _identified(result: IdentificationResult, aircraft: Aircraft | None) -> Iden
     sources = [(s.name, s.sha256, s.runs) for s in result.sources]
     made: Record = {**record, "sources": sources}  # type: ignore[typeddict-item]  # to_dict gives its keys
     records = dict.fromkeys(result.methods, made)
-    refuse_records(result.settings.motion, None, aircraft)
+    refuse_declared(result.settings.motion, aircraft)
     histories, declared = result.histories(), None
     if aircraft is not None and histories is not None and result.logs is not None:
         from airtruth.reporting.pages.declared import declared_at
@@ -157,9 +156,7 @@ def _identified(result: IdentificationResult, aircraft: Aircraft | None) -> Iden
         frame=result.to_frame(),
         records=records,
         histories=histories,
-        reason="The result holds no logs, so the records are not shown."
-        if simulates(result.settings.motion)
-        else NOT_SIMULATED,
+        reason="The result holds no logs, so the records are not shown.",
         declared=declared,
     )
 

@@ -14,7 +14,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError, ConfigurationError, StoreError
 from airtruth.identification.estimates import JOINT
 from airtruth.identification.methods import DEFAULT
-from airtruth.identification.record_constants import RecordConstants, values_of
+from airtruth.identification.record_constants import LateralValues, RecordConstants, values_of
 from airtruth.identification.simulated import simulated_records, spaced
 from airtruth.identification.store import other_constants
 from airtruth.identification.stored import Record, read_stored
@@ -29,13 +29,14 @@ if TYPE_CHECKING:
 
     from airtruth.reporting.pages.declared import DeclaredDerivatives
 
-SIMULATED: Final = (
-    "Simulation: the linear short period with the derivatives of each method, from the measured elevator, at the mean "
-    "airspeed and density of the record; initial state, trim and offset of az are fitted to each record, alike for all methods."
-)
-"""How the models of an identification are simulated."""
-NOT_SIMULATED: Final = "The records of the lateral motion are not simulated, so they are not shown."
-"""Why a page of lateral estimates has no records."""
+SIMULATED: Final[Mapping[str, str]] = {
+    LONGITUDINAL.name: "Simulation: the linear short period with the derivatives of each method, from the measured elevator, at "
+    "the mean airspeed and density of the record; initial state, trim and offset of az are fitted to each record, alike for all "
+    "methods.",
+    LATERAL.name: "Simulation: the linear motion with the derivatives of each method, from the measured controls, airspeed and "
+    "pitching motion; initial state and biases of the outputs are fitted to each record. No gust is simulated.",
+}
+"""Motion -> how the models of an identification are simulated."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def read_identified(
     StoreError, LogError
         If the file cannot be read or is damaged, or a log that is given cannot be used.
     ConfigurationError
-        If logs or an aircraft are given for estimates of the lateral motion, or the aircraft has other constants.
+        If an aircraft is given for estimates of the lateral motion, or it has other constants.
     AircraftError, TrimError
         If the aircraft cannot be trimmed at the condition of the records.
     """
@@ -95,9 +96,7 @@ def read_identified(
     )
     frame, records = read_stored(path, rows)
     motion = motion_of(frame.columns)
-    refuse_records(motion, logs, aircraft)
-    if not simulates(motion):
-        return Identified(frame, records, None, NOT_SIMULATED)
+    refuse_declared(motion, aircraft)
     if logs is None:
         logs, reason = _beside(path.parent, records)
         if reason:
@@ -118,24 +117,24 @@ def read_identified(
     return Identified(frame, records, histories, declared=declared)
 
 
-def simulates(motion: Motion) -> bool:
-    """Whether a page simulates the records of a motion."""
+def compares(motion: Motion) -> bool:
+    """Whether a page compares the estimates of a motion with the declared aircraft."""
     return motion is LONGITUDINAL
 
 
-def refuse_records(motion: Motion, logs: Logs | None, aircraft: Aircraft | None) -> None:
-    """Refuse logs and an aircraft for estimates of a motion whose records are not simulated.
+def refuse_declared(motion: Motion, aircraft: Aircraft | None) -> None:
+    """Refuse an aircraft for estimates of a motion that are not compared with it.
 
     Raises
     ------
     ConfigurationError
         Naming the option.
     """
-    for option, value in (("--log", logs), ("--aircraft", aircraft)):
-        if value is not None and not simulates(motion):
-            raise ConfigurationError(
-                f"{option} simulates records, which the page of estimates of the {motion.name} motion does not show; leave it out"
-            )
+    if aircraft is not None and not compares(motion):
+        raise ConfigurationError(
+            f"--aircraft compares the declared aircraft, which the page of estimates of the {motion.name} motion does not show; "
+            "leave it out"
+        )
 
 
 def require_same_aircraft(records: Mapping[str, Record], aircraft: Aircraft) -> None:
@@ -159,7 +158,8 @@ def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record], r
         raise StoreError("the estimates do not state the constants of their aircraft; identify again")
     own = next(iter(records.values()))
     taken = own.get("sensors", {})
-    return simulated_records(logs, frame, RecordConstants(**own["constants"]), of_runs=runs, taken=taken)
+    kind = LateralValues if motion_of(frame.columns) is LATERAL else RecordConstants
+    return simulated_records(logs, frame, kind(**own["constants"]), of_runs=runs, taken=taken)
 
 
 def _beside(folder: Path, records: Mapping[str, Record]) -> tuple[list[str], str]:
@@ -267,11 +267,10 @@ def _disagree(frame: pd.DataFrame, methods: Sequence[str], name: str) -> bool:
 
 
 __all__ = [
-    "NOT_SIMULATED",
     "SIMULATED",
     "Identified",
     "answer_of",
+    "compares",
     "read_identified",
-    "refuse_records",
-    "simulates",
+    "refuse_declared",
 ]
