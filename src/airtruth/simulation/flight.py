@@ -16,10 +16,9 @@ from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, FlightError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.terms import ELEVATOR
-from airtruth.simulation.attitude import straight_attitude
 from airtruth.simulation.lateral_feedback import FED, LateralFeedback, Loop
 from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
-from airtruth.simulation.simulator import Executive
+from airtruth.simulation.simulator import BANK, Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
@@ -96,7 +95,7 @@ class Flight:
 
     def _start(self) -> None:
         executive, trim = self._executive, self.trim
-        executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+        executive.initialise(trim.condition, trim.controls)
         model = executive.model
         self._elevator = model.elevator
         self._augmentation = model.augmentation
@@ -159,9 +158,7 @@ class Flight:
         at, gamma = self.trim, self.trim.condition.gamma_rad
         if not at.condition.six_axes:
             return at.alpha_rad + gamma
-        return straight_attitude(
-            at.alpha_rad, at.controls.sideslip_rad, at.controls.bank_rad, gamma
-        ).theta_rad
+        return at.controls.attitude(gamma).theta_rad
 
     def _simulate(self, inputs: Inputs) -> Array:
         renewed = self._executive.renewed() if self._flown else self._executive
@@ -216,7 +213,7 @@ class Flight:
             return None
         motion = self._executive.nodes([SIGNALS[name].jsbsim for name in FED])
         reads = [node.get_double_value for node in motion]
-        return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.bank_rad, reads)
+        return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.of(BANK), reads)
 
     def _inputs(
         self, inputs: Inputs, loop: Loop | None

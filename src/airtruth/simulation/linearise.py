@@ -15,8 +15,7 @@ from airtruth.errors import TrimError
 from airtruth.physics import short_period
 from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_scale
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
-from airtruth.simulation.attitude import straight_attitude
-from airtruth.simulation.simulator import Executive
+from airtruth.simulation.simulator import BANK, Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG, FT, PSF
 
@@ -96,10 +95,10 @@ def _answer(executive: Executive, trim: Trim, motion: Motion, change: Mapping[st
     off = {signal.channel: change.get(signal.name, 0.0) for signal in motion.signals}
     at = trim.controls
     commands = {c.name: at.command(c.name) + off.pop(c.channel) for c in motion.controls}
-    alpha = trim.alpha_rad + off.pop(LONGITUDINAL.vane, 0.0)
-    sideslip = at.sideslip_rad + off.pop(LATERAL.vane, 0.0)
-    executive.initialise(trim.condition, alpha, at.moved(commands, sideslip_rad=sideslip), off)
-    answered = _coefficients(executive, trim) if motion is LATERAL else _accelerations(executive, trim, alpha)
+    at = at.moved(commands, **{channel: at.of(channel) + more for channel, more in off.items()})
+    executive.initialise(trim.condition, at)
+    flow = at.of(LONGITUDINAL.vane)
+    answered = _coefficients(executive, trim) if motion is LATERAL else _accelerations(executive, trim, flow)
     response = executive.respond()
     return np.array([*answered, *(response.surfaces_rad[c.name] for c in motion.controls)])
 
@@ -154,14 +153,13 @@ def _in_pitch(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) 
 
 
 def _in_six_axes(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) -> Linearisation:
-    c, at = aircraft.constants, trim.controls
-    attitude = straight_attitude(trim.alpha_rad, at.sideslip_rad, at.bank_rad, trim.condition.gamma_rad)
+    c = aircraft.constants
     s = lateral_scale(
         c.model_copy(update={"mass_kg": trim.mass_kg}),
         trim.airspeed_m_s,
         trim.density_kg_m3,
         trim.alpha_rad,
-        attitude.theta_rad,
+        trim.controls.attitude(trim.condition.gamma_rad).theta_rad,
     )
     rates = np.array([1.0, *2 * [2.0 * trim.airspeed_m_s / c.span_m]])
     plus, minus = (np.hstack([a * rates, b]).ravel() for a, b in sides)
@@ -186,11 +184,10 @@ def lateral_truth(linear: Linearisation | None, trim: Trim | None) -> dict[str, 
         values = missing if linear is None else getattr(linear, side)
         result |= {name + suffix: float(v) for name, v in zip(names, values, strict=True)}
     result |= {name: np.nan if linear is None else linear.modes[name] for name in LATERAL.modal}
-    at = None if trim is None else trim.controls
+    for c in LATERAL.controls:
+        result[f"trim_{c.channel}"] = trim.surfaces_rad[c.name] if trim else np.nan
     return result | {
-        **{f"trim_{c.channel}": trim.surfaces_rad[c.name] if trim else np.nan for c in LATERAL.controls},
-        "trim_phi_rad": at.bank_rad if at else np.nan,
-        "trim_beta_rad": at.sideslip_rad if at else np.nan,
+        f"trim_{name}": trim.controls.of(name) if trim else np.nan for name in (BANK, LATERAL.vane)
     }
 
 

@@ -17,7 +17,6 @@ from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.operating_point import lateral_operating_point, operating_point
 from airtruth.simulation.probe import ForceGrid, forces_at_speeds
-from airtruth.simulation.probe_lateral import LateralForceGrid
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.model.declared import declared_covariance
@@ -93,22 +92,21 @@ def probed(
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _MARGIN, _LEAST_RATE[None])
     offset = at.controls.command(ELEVATOR) - at.elevator_rad
     commands = whole(elevator[0] + offset, elevator[1] + offset)
-    grid = ForceGrid(whole(*alpha), commands, rates, np.ones(1))
+    grid = ForceGrid((whole(*alpha), commands, rates), np.ones(1))
     point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, SPEEDS)
     tables, power = point.tables, _engines_of(at, point.at_speeds)
     over_alpha = _lines(at, point.over_alpha)[0]
     constant = power.constant + (
-        over_alpha - over_alpha[int(np.argmin(np.abs(tables.alpha_rad - at.alpha_rad)))]
+        over_alpha - over_alpha[int(np.argmin(np.abs(tables.axes[0] - at.alpha_rad)))]
     )
     values = (tables.values[0] - constant[:, None, None]) / _pressure(at)
-    qhat = tables.q_rad_s * aircraft.constants.chord_m / (2.0 * at.airspeed_m_s)
+    *angles, rate = tables.axes
+    qhat = rate * aircraft.constants.chord_m / (2.0 * at.airspeed_m_s)
     (names,) = LAYOUTS[LONGITUDINAL.name]
     return Plant(
         aircraft=aircraft,
         motion=LONGITUDINAL,
-        tables=(
-            ForceTable(names, (tables.alpha_rad, tables.elevator_rad, qhat), np.ascontiguousarray(values)),
-        ),
+        tables=(ForceTable(names, (*angles, qhat), np.ascontiguousarray(values)),),
         constant=constant,
         trims=dict(zip(names, (at.alpha_rad, at.elevator_rad, 0.0), strict=True)),
         neutral_rad=np.zeros(len(LONGITUDINAL.controls)),
@@ -140,7 +138,7 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
         lateral_operating_point,
         aircraft,
         at,
-        LateralForceGrid(_whole(*reach[FLOW]), axes, SPEEDS),
+        ForceGrid((_whole(*reach[FLOW]), *axes), SPEEDS),
     )
     tables, derivatives = point.tables, point.derivatives.central
     constant = _lines(at, tables.over_alpha)[0]
@@ -149,14 +147,13 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
         (own - (constant if number == 0 else middle)[:, None]) / _pressure(at)
         for number, own in enumerate(tables.values)
     ]
-    own_axes = [x * f for x, f in zip(tables.signals, factors, strict=True)]
-    surfaces = [at.surfaces_rad[control.name] for control in LATERAL.controls]
-    origin = [at.controls.sideslip_rad, 0.0, 0.0, *surfaces]
+    own_axes = [x * f for x, f in zip(tables.axes[1:], factors, strict=True)]
+    origin = at.origin(LATERAL).tolist()
     return Plant(
         aircraft=aircraft,
         motion=LATERAL,
         tables=tuple(
-            ForceTable(names, (tables.alpha_rad, axis), own)
+            ForceTable(names, (tables.axes[0], axis), own)
             for names, (axis, own) in zip(
                 LAYOUTS[LATERAL.name], _of_one_length(own_axes, values), strict=True
             )
