@@ -143,7 +143,7 @@ def test_the_result_shows_both_motions(mixed):
     shown = [ax.get_ylabel() for ax in figure.axes if ax.axison]
     assert shown == [
         "elevator [rad]", "alpha [rad]", "q [rad/s]", "az [m/s2]", "aileron [rad]", "rudder [rad]", "beta [rad]",
-        "phi [rad]", "p [rad/s]", "r [rad/s]", "ay [m/s2]",
+        "p [rad/s]", "r [rad/s]", "phi [rad]", "ay [m/s2]",
     ]  # fmt: skip
 
 

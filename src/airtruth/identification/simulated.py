@@ -24,7 +24,7 @@ from airtruth.logs.histories import Histories, History
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import Scale, normal_force_row, scale, system
+from airtruth.physics.short_period import Scale, normal_force_row, scale_of, system
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -163,7 +163,7 @@ def _record(
         channels, t_s = {name: values[0] for name, values in ideal.channels.items()}, ideal.t_s[0]
     airspeed, density = float(channels["airspeed_m_s"].mean()), float(air_density(channels).mean())
     own = values_of(constants)
-    s = scale(own.wing_area_m2, own.chord_m, own.mass_kg, own.inertia_yy_kg_m2, airspeed, density)
+    s = scale_of(own, airspeed, density)
     measured = np.stack([channels[c] for c in OUTPUTS], axis=1)
     (control,) = LONGITUDINAL.surfaces
     models = {}

@@ -33,6 +33,11 @@ STEPS: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
 pitch plane inside a cell of tables stated in degrees, and far above rounding; tables of a symmetric
 aircraft break at zero, a tenth of a degree beside its trim, and central differences over the break are the mean of its sides,
 which a flight sees."""
+_TRUTH: Final = {
+    LONGITUDINAL.name: (("plus", "minus", "central"), (LONGITUDINAL.vane, *LONGITUDINAL.surfaces)),
+    LATERAL.name: (("central", "plus", "minus"), (*LATERAL.surfaces, BANK, LATERAL.vane)),
+}
+"""Motion -> sides of its differences in truth.parquet, the true ones first, and channels of its trim there."""
 _LEAST_MOTION: Final = 1e-6
 """Least determinant of the motion of the surfaces with their commands [-]: a surface that stands still is refused."""
 _FORCES: Final = ("forces/fby-total-lbs", "moments/l-total-lbsft", "moments/n-total-lbsft")
@@ -142,10 +147,8 @@ def _one_sided(
 
 
 def _in_pitch(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) -> Linearisation:
-    c = aircraft.constants
-    s = short_period.scale(
-        c.wing_area_m2, c.chord_m, trim.mass_kg, c.inertia_yy_kg_m2, trim.airspeed_m_s, trim.density_kg_m3
-    )
+    c = aircraft.constants.model_copy(update={"mass_kg": trim.mass_kg})
+    s = short_period.scale_of(c, trim.airspeed_m_s, trim.density_kg_m3)
     plus, minus = (short_period.derivatives(a, b[:, 0], s) for a, b in sides)
     modes = map(float, short_period.modal(plus, s))
     named = dict(zip(LONGITUDINAL.modal, modes, strict=True))
@@ -168,27 +171,22 @@ def _in_six_axes(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]
     return Linearisation(plus, minus, central, s, modes)
 
 
-def lateral_truth(linear: Linearisation | None, trim: Trim | None) -> dict[str, float]:
-    """Columns of truth.parquet of a run in six axes.
-
-    The derivatives are central differences, with those of each side beside them; then modes and the lateral trim.
+def truth_of(motion: Motion, linear: Linearisation | None, trim: Trim | None) -> dict[str, float]:
+    """Columns of truth.parquet of a motion: its derivatives with those of the other sides beside them, modes, and trim.
 
     Parameters
     ----------
     linear, trim : of the run's condition; None for a run that failed, whose columns are NaN.
     """
-    names = LATERAL.parameters
-    missing = np.full(len(names), np.nan)
+    missing = np.full(len(motion.parameters), np.nan)
     result: dict[str, float] = {}
-    for suffix, side in (("", "central"), ("_plus", "plus"), ("_minus", "minus")):
+    sides, at_trim = _TRUTH[motion.name]
+    for side in sides:
+        suffix = "" if side == sides[0] else f"_{side}"
         values = missing if linear is None else getattr(linear, side)
-        result |= {name + suffix: float(v) for name, v in zip(names, values, strict=True)}
-    result |= {name: np.nan if linear is None else linear.modes[name] for name in LATERAL.modal}
-    for c in LATERAL.controls:
-        result[f"trim_{c.channel}"] = trim.surfaces_rad[c.name] if trim else np.nan
-    return result | {
-        f"trim_{name}": trim.controls.of(name) if trim else np.nan for name in (BANK, LATERAL.vane)
-    }
+        result |= {name + suffix: float(v) for name, v in zip(motion.parameters, values, strict=True)}
+    result |= {name: np.nan if linear is None else linear.modes[name] for name in motion.modal}
+    return result | {f"trim_{channel}": np.nan if trim is None else trim.of(channel) for channel in at_trim}
 
 
-__all__ = ["STEPS", "Linearisation", "lateral_truth", "linearise"]
+__all__ = ["STEPS", "Linearisation", "linearise", "truth_of"]

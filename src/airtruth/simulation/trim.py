@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
-from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
 from airtruth.simulation.simulator import BANK, Condition, Controls, Executive, SimulatorResponse
@@ -81,10 +81,15 @@ class Trim:
         """Angle of attack [rad]."""
         return self.controls.of(LONGITUDINAL.vane)
 
+    def of(self, channel: str) -> float:
+        """Value of a surface, a flow angle, the bank or an angular rate at the equilibrium [rad], [rad/s]."""
+        controls = (control for motion in MOTIONS.values() for control in motion.controls)
+        surface = next((self.surfaces_rad.get(c.name) for c in controls if c.channel == channel), None)
+        return self.controls.of(channel) if surface is None else surface
+
     def origin(self, motion: Motion) -> Array:
         """(signals,) values of the signals of a motion at the equilibrium, the rates per second [rad], [rad/s]."""
-        surfaces = {c.channel: self.surfaces_rad[c.name] for c in motion.controls}
-        return np.array([surfaces.get(s.channel, self.controls.of(s.channel)) for s in motion.signals])
+        return np.array([self.of(signal.channel) for signal in motion.signals])
 
     @property
     def elevator_rad(self) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.motion_parts import Signal, reference_length_m
 from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.operating_point import lateral_operating_point, operating_point
@@ -100,13 +101,14 @@ def probed(
         over_alpha - over_alpha[int(np.argmin(np.abs(tables.axes[0] - at.alpha_rad)))]
     )
     values = (tables.values[0] - constant[:, None, None]) / _pressure(at)
-    *angles, rate = tables.axes
-    qhat = rate * aircraft.constants.chord_m / (2.0 * at.airspeed_m_s)
     (names,) = LAYOUTS[LONGITUDINAL.name]
+    *angles, rate = tables.axes
+    signals = {signal.name: signal for signal in LONGITUDINAL.signals}
+    rate = rate * reference_length_m(aircraft.constants, signals[names[-1]].length) / (2.0 * at.airspeed_m_s)
     return Plant(
         aircraft=aircraft,
         motion=LONGITUDINAL,
-        tables=(ForceTable(names, (*angles, qhat), np.ascontiguousarray(values)),),
+        tables=(ForceTable(names, (*angles, rate), np.ascontiguousarray(values)),),
         constant=constant,
         trims=dict(zip(names, (at.alpha_rad, at.elevator_rad, 0.0), strict=True)),
         neutral_rad=np.zeros(len(LONGITUDINAL.controls)),
@@ -127,11 +129,10 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
     ----------
     reach : signal, the angle of attack among them -> lowest and highest value [rad, -].
     """
-    half = aircraft.constants.span_m / (2.0 * at.airspeed_m_s)
-    factors = [1.0 if s.length is None else half for s in LATERAL.signals]
+    factors = [_to_signal(aircraft, at, signal) for signal in LATERAL.signals]
     axes = tuple(
         _whole(*reach[s.name]) if s.length is None else _rates(*reach[s.name], _LEAST_RATE[s.length]) / half
-        for s in LATERAL.signals
+        for s, half in zip(LATERAL.signals, factors, strict=True)
     )
     point = isolated(
         f"the table of lateral forces of {aircraft.name}",
@@ -165,6 +166,12 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
         derivative_cov=declared_covariance(aircraft, derivatives, LATERAL),
         trim=at,
     )
+
+
+def _to_signal(aircraft: Aircraft, at: Trim, signal: Signal) -> float:
+    """Factor from a channel to its signal: 1 for an angle, l/(2V) for a rate."""
+    half = reference_length_m(aircraft.constants, signal.length) / (2.0 * at.airspeed_m_s)
+    return 1.0 if signal.length is None else half
 
 
 def engines(aircraft: Aircraft, at: Trim) -> Engines:
