@@ -16,7 +16,7 @@ from airtruth.physics.sensor_errors import SensorErrors
 
 Array = NDArray[np.float64]
 
-_ACCELEROMETERS: Final = ("ax_m_s2", LATERAL.outputs[-1].channel, LONGITUDINAL.outputs[-1].channel)
+ACCELEROMETERS: Final = ("ax_m_s2", LATERAL.outputs[-1].channel, LONGITUDINAL.outputs[-1].channel)
 """Channels of specific force along x, y, z."""
 
 
@@ -213,18 +213,19 @@ def at_instrument(channel: str, truth: Mapping[str, Array], errors: SensorErrors
     if channel == LATERAL.vane:
         rates = truth[rolling], truth[yawing]
         return side_vane_equation(truth[channel], *rates, x, z, truth["airspeed_m_s"])
-    if channel in _ACCELEROMETERS and rolls:
+    if channel in ACCELEROMETERS and rolls:
         turning, changes = ([truth[f"{axis}_{unit}"] for axis in "pqr"] for unit in ("rad_s", "dot_rad_s2"))
-        moved: Array = rotation_acceleration(turning, changes, arm)[_ACCELEROMETERS.index(channel)]
+        moved: Array = rotation_acceleration(turning, changes, arm)[ACCELEROMETERS.index(channel)]
         return truth[channel] + moved
-    if channel == _ACCELEROMETERS[2]:
+    if channel == ACCELEROMETERS[2]:
         return accelerometer_az(truth[channel], truth["q_dot_rad_s2"], x, truth[pitching], z)
-    if channel == _ACCELEROMETERS[0]:
+    if channel == ACCELEROMETERS[0]:
         return accelerometer_ax(truth[channel], truth[pitching], truth["q_dot_rad_s2"], x, z)
     return truth[channel]
 
 
 __all__ = [
+    "ACCELEROMETERS",
     "accelerometer_ax",
     "accelerometer_az",
     "at_instrument",

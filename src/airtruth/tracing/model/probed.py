@@ -110,7 +110,7 @@ def probed(
         motion=LONGITUDINAL,
         tables=(ForceTable(names, (*angles, rate), np.ascontiguousarray(values)),),
         constant=constant,
-        trims=dict(zip(names, (at.alpha_rad, at.elevator_rad, 0.0), strict=True)),
+        trims={name: at.of(signals[name].channel) for name in names},
         neutral_rad=np.zeros(len(LONGITUDINAL.controls)),
         derivatives=point.derivatives.central,
         derivative_cov=declared_covariance(aircraft, point.derivatives.central),
