@@ -37,7 +37,7 @@ from airtruth.checks.factors import (
 from airtruth.checks.means import LEVEL, LIMITS, air, gravity, ranges
 from airtruth.checks.relation import Relation
 from airtruth.checks.rotation import across_flow, alpha_coupling, pitched
-from airtruth.checks.slopes import slopes_near_trim
+from airtruth.checks.slopes import CONTROL_POWER, slopes_near_trim
 from airtruth.checks.spectra import Factors, instruments, integral, regress
 from airtruth.checks.together import Runs
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
@@ -161,7 +161,7 @@ def _alpha_relation(runs: Runs, lines: NDArray[np.int64]) -> Relation:
     return found
 
 
-OF_ELEVATOR: Final = (*(control.name for control in LONGITUDINAL.controls), "Cmde")
+OF_ELEVATOR: Final = (*(control.name for control in LONGITUDINAL.controls), CONTROL_POWER)
 """Tests of what the elevator does, to which a record counts only if its elevator moves."""
 
 

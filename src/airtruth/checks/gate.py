@@ -381,14 +381,12 @@ def _over(
 
 def _unrelated(several: Runs, failed: Relation) -> bool:
     """Whether theta and q have nothing in common although the wings are level: a turn has more load."""
-    normal = LONGITUDINAL.outputs[-1].channel
+    *_, normal = LONGITUDINAL.output_channels
     if failed.name != "theta" or normal not in several.channels:
         return False
     load = float(np.median(several.each(lambda c, dt_s: np.median(c[normal], axis=1)))) / -G0
-    if load > LEVEL_LOAD:
-        return False
     _, std, share, _ = failed.figures[-1]
-    return bool(share < UNRELATED and std < UNRELATED_STD)
+    return bool(load <= LEVEL_LOAD and share < UNRELATED and std < UNRELATED_STD)
 
 
 def _commanded(several: Runs) -> bool:

@@ -16,7 +16,10 @@ COMPUTED: Final = (
     f"it fits them by construction, which is no evidence, so errors of {_SPEED}, {_NORMAL} and ax_m_s2 are not assessed."
 )
 """The first sentence of a check without a vane."""
-REMEDY: Final = f"Compare the airspeed with ground speed on opposite headings and {_NORMAL} with gravity at rest, or record a vane."
+REMEDY: Final = (
+    "Compare the airspeed with ground speed on opposite headings and "
+    f"{_NORMAL} with gravity at rest, or record a vane."
+)
 """Advice on finding the errors that remain."""
 WITHOUT_ATTITUDE: Final = f"Without theta_rad {_RATE} is not assessed either. {REMEDY}"
 """The second sentence of a check without a vane and without a pitch attitude."""

@@ -15,6 +15,7 @@ from airtruth.errors import TrimError
 from airtruth.physics import short_period
 from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_scale
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.simulation.probe_lateral import FORCES
 from airtruth.simulation.simulator import BANK, Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG, FT, PSF
@@ -40,8 +41,6 @@ _TRUTH: Final = {
 """Motion -> sides of its differences in truth.parquet, the true ones first, and channels of its trim there."""
 _LEAST_MOTION: Final = 1e-6
 """Least determinant of the motion of the surfaces with their commands [-]: a surface that stands still is refused."""
-_FORCES: Final = ("forces/fby-total-lbs", "moments/l-total-lbsft", "moments/n-total-lbsft")
-"""Side force [lbf], rolling and yawing moment about the CG [lbf ft], without gravity."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ def _accelerations(executive: Executive, trim: Trim, alpha: float) -> tuple[floa
 def _coefficients(executive: Executive, trim: Trim) -> tuple[float, ...]:
     """CY, Cl and Cn in the present state [-]."""
     c = executive.aircraft.constants
-    force, roll, yaw = (executive.fdm[name] for name in _FORCES)
+    force, roll, yaw = (executive.fdm[name] for name in FORCES)
     area = 0.5 * trim.density_kg_m3 * trim.airspeed_m_s**2 / PSF * c.wing_area_m2 / FT**2  # q_bar S [lbf]
     span = c.span_m / FT
     return force / area, roll / (area * span), yaw / (area * span)

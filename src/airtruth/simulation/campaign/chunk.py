@@ -216,20 +216,17 @@ class Pilot:
             command_rad=command.get(ELEVATOR, still),
             gust_u_m_s=air.u_m_s,
             gust_w_m_s=air.w_m_s,
-            gust_q_rad_s=air.q_rad_s,
+            rotation_rad_s=air.rotation_of(LONGITUDINAL),
             damper_gain_s=gains.damper_gain_s,
             attitude_gain=gains.attitude_gain,
             surface=flown[0].surface,
         )
         if gains.damper_gain_s or gains.attitude_gain:
-            inputs = replace(
-                inputs,
-                q_error_rad_s=self._error(LONGITUDINAL.gyros[0], run),
-                theta_error_rad=self._error("theta_rad", run),
-            )
+            seen = (*LONGITUDINAL.gyros, "theta_rad")
+            inputs = replace(inputs, errors={name: self._error(name, run) for name in seen})
         if plan.campaign.lateral:
             lateral = {name: command.get(name, still) for name in LATERAL_CONTROLS}
-            turning = LateralInputs(lateral, air.v_m_s, air.p_rad_s, air.r_rad_s, self._feedback(run))
+            turning = LateralInputs(lateral, air.v_m_s, air.rotation_of(LATERAL), self._feedback(run))
             inputs = replace(inputs, lateral=turning)
         return prepared.flight.fly(inputs)
 
