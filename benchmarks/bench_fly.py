@@ -40,7 +40,7 @@ def overhead() -> float:
     pilot = Pilot(made)
     at = trim(made.aircraft, plan.planned_runs(made.table.head(1))[0].condition, made.dt_s)
     bare = Executive(made.aircraft, made.dt_s)
-    bare.initialise(at.condition, at.alpha_rad, at.controls)
+    bare.initialise(at.condition, at.controls)
     bare.fdm.set_trim_status(False)
     run = bare.fdm.run
 

@@ -142,7 +142,7 @@ def level_wings(aircraft: Aircraft, condition: Condition) -> str:
     def moments(x: Array) -> Array:
         for name, value in zip(names, x, strict=True):
             executive.node(name).set_double_value(float(value))
-        executive.initialise(condition, at.alpha_rad, at.controls)
+        executive.initialise(condition, at.controls)
         rates = executive.nodes(["accelerations/pdot-rad_sec2", "accelerations/rdot-rad_sec2"])
         return np.array([node.get_double_value() for node in rates])
 
@@ -182,7 +182,7 @@ def expected_cmq(flown: Flown, cmq: float, cm_alpha_dot: float, cl_q: float, cl_
     that of the two-state model, the alpha-dot terms become terms in q.
     """
     executive = Executive(flown.aircraft, 1.0 / 200.0)
-    executive.initialise(flown.trim.condition, flown.trim.alpha_rad, flown.trim.controls)
+    executive.initialise(flown.trim.condition, flown.trim.controls)
     names = ("inertia/cg-x-in", "metrics/aero-rp-x-in")
     cg, reference = (node.get_double_value() * INCH for node in executive.nodes(names))
     arm, s = (cg - reference) / flown.aircraft.chord_m, flown.linear.scale
@@ -259,7 +259,7 @@ def main() -> None:
         for name, reach in (("c172x", 4.0), ("f16", 3.0)):
             flown = first[name]
             model = model_of(
-                flown.aircraft, flown.trim, grid_about(flown.trim, reach * DEG, reach * DEG, 24.0 * DEG)
+                flown.aircraft, flown.trim, grid_about(flown.trim, (reach * DEG, reach * DEG, 24.0 * DEG))
             )
             for drift, word in ((1.0, "free"), (0.0, "held")):
                 batch = simulated(replace(model, drift=drift), flown)

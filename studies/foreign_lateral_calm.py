@@ -172,11 +172,11 @@ def propellers(folder: Path) -> tuple[float, float]:
     settled = []
     for side in (-1.0, 1.0):
         one = executive.again()
-        one.initialise(at.condition, at.alpha_rad, at.controls, {"r_rad_s": side * DEG})
+        one.initialise(at.condition, at.controls.moved({}, r_rad_s=side * DEG))
         one.respond()
         settled.append(row(one.fdm))
     change = np.subtract(settled[1], settled[0])
-    executive.initialise(at.condition, at.alpha_rad, at.controls)
+    executive.initialise(at.condition, at.controls)
     fdm, rows = executive.fdm, []
     trims = {name: fdm[name] for name in STICKS}
     for k in range(round(10.0 * RATE_HZ)):

@@ -58,7 +58,7 @@ class Longitudinal:
 def model_of(aircraft: Aircraft, trim: Trim, grid: ForceGrid | None = None) -> Longitudinal:
     """The aircraft in the vertical plane, from its forces in JSBSim; see `airtruth.simulation.probe.probe`."""
     executive = Executive(aircraft, 1.0 / 200.0)
-    executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+    executive.initialise(trim.condition, trim.controls)
     return Longitudinal(
         tables=probe(aircraft, trim, grid),
         mass_kg=trim.mass_kg,
@@ -245,8 +245,7 @@ def simulate(
     runs, samples = elevator.shape
     added = np.zeros((runs, 6)) if shift is None else np.ascontiguousarray(shift)
     out = np.empty((runs, 6, samples))
-    axes = (t.airspeed_m_s, t.alpha_rad, t.elevator_rad, t.q_rad_s)
-    _integrate(elevator, trim, added, dt_s, *axes, t.values, out)
+    _integrate(elevator, trim, added, dt_s, t.airspeed_m_s, *t.axes, t.values, out)
     return SimulatedMotion(*(np.ascontiguousarray(out[:, i]) for i in range(6)))
 
 

@@ -13,7 +13,7 @@ from airtruth.errors import ConfigurationError
 from airtruth.physics.atmosphere import altitude_of_density_m, equivalent_airspeed_m_s
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
-from airtruth.simulation.linearise import lateral_truth, linearise
+from airtruth.simulation.linearise import linearise, truth_of
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG, G0
@@ -44,7 +44,7 @@ def test_linearised_in_six_axes_it_gives_its_derivatives_back(declared, tmp_path
     new = write_new(declared, alone, AT, tmp_path / "new" / "gtm")
     found = at_trim(new)
     assert sum(abs(found.surfaces_rad[name]) for name in ("aileron", "rudder")) < 1e-6
-    true = lateral_truth(linearise(new, found, motion=LATERAL), found)
+    true = truth_of(LATERAL, linearise(new, found, motion=LATERAL), found)
     wanted = dict(zip(LATERAL.parameters, GTM.lateral.ravel().tolist(), strict=True))
     assert {k: true[k] for k in wanted} == pytest.approx(wanted, rel=2e-3, abs=2e-4)
     assert set(new.file.derivatives) == set(LATERAL.parameters)

@@ -10,7 +10,7 @@ import pytest
 
 from airtruth import aircraft as planes
 from airtruth.checks.gate import admit, inspect
-from airtruth.checks.kinematics import check_logs
+from airtruth.checks.motions import check_motions
 from airtruth.checks.stated import KEY
 from airtruth.errors import LogError
 from airtruth.identification import identify
@@ -190,7 +190,7 @@ def vaneless(log, airspeed, theta):
 @pytest.mark.parametrize("theta", [True, False])
 def test_a_reconstructed_alpha_is_no_evidence(log, gtm, theta):
     """With 0.8 of the airspeed every channel agreed with the alpha that was computed from it."""
-    result = check_logs([("", vaneless(log, 0.8, theta))], gtm)
+    result = check_motions([("", vaneless(log, 0.8, theta))], gtm, motion="longitudinal")["longitudinal"]
     assert result.verdict == "cannot_tell"
     text = result.summary()
     assert "agree" not in text

@@ -107,7 +107,7 @@ def record(c):
 def measured(true, errors):
     """Readings with instrument errors, made by the sensor equations of physics."""
     e = {n: errors.get(n, error.neutral) for n, error in ERRORS.items()}
-    alpha = sensors.vane_alpha(true["alpha_rad"], true["q_rad_s"], e["vane_arm"], true["airspeed_m_s"])
+    alpha = sensors.vane_equation(true["alpha_rad"], true["q_rad_s"], e["vane_arm"], true["airspeed_m_s"])
     az = sensors.accelerometer_az(true["az_m_s2"], true["q_dot"], e["accelerometer_arm"])
 
     def late(x, delay, scale, lag=0.0):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtruth.checks.kinematics import check_log
+from airtruth.checks.motions import check_motions
 from airtruth.checks.poor import FLOOR, measured, words
 from airtruth.identification import identify
 from airtruth.logs.flight_log import FlightLog
@@ -45,7 +45,7 @@ def test_gusts_that_drown_a_manoeuvre_are_stated_first_and_with_figures():
     )
     log = log_of(rough)
     assert identify(log, GTM, ["ls"]).notes[0] == sentence
-    assert check_log(log).sentences[0] == sentence
+    assert check_motions([("", log)])["longitudinal"].sentences[0] == sentence
     calm = log_of(flight(runs=4, gust=0.0, seed=3))
     assert not any("moves the aircraft less" in note for note in identify(calm, GTM, ["ls"]).notes)
 

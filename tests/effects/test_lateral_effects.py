@@ -92,8 +92,8 @@ def test_the_effectiveness_of_a_control_scales_its_column(gtm, level, point, tmp
 def accelerations(plane, at, beta=0.0, p=0.0, r=0.0):
     """v_dot, p_dot, r_dot of a plane at another's trim with a sideslip and rates [m/s2, rad/s2]."""
     executive = Executive(plane, 1.0 / 200.0)
-    controls = replace(at.controls, sideslip_rad=at.controls.sideslip_rad + beta)
-    executive.initialise(at.condition, at.alpha_rad, controls, {"p_rad_s": p, "r_rad_s": r})
+    moved = {"beta_rad": at.controls.of("beta_rad") + beta, "p_rad_s": p, "r_rad_s": r}
+    executive.initialise(at.condition, at.controls.moved({}, **moved))
     found = executive.respond()
     return np.array([found.v_dot_m_s2, found.p_dot_rad_s2, found.r_dot_rad_s2])
 
@@ -119,7 +119,7 @@ def test_a_break_adds_its_moment_beyond_the_sideslip(gtm, at, tmp_path, key, mom
     change = EFFECTS[key].change({moment: 0.3, "at_beta_rad": 0.12})
     plane = flights.changed(gtm, change, tmp_path)
     found = accelerations(plane, at, beta) - accelerations(gtm, at, beta)
-    total = at.controls.sideslip_rad + beta
+    total = at.controls.of("beta_rad") + beta
     added = np.zeros(2)
     added[row] = 0.3 * np.sign(total) * (abs(total) - 0.12) * pressure(at, gtm) * gtm.constants.span_m
     np.testing.assert_allclose(found, [0.0, *np.linalg.solve(INERTIA, added)], rtol=1e-3, atol=1e-6)

@@ -13,6 +13,7 @@ import airtruth as at
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.exporting.model import SYSTEMS, FlightPoint, LinearModel
 from airtruth.identification import identify
+from airtruth.identification.record_constants import values_of
 from airtruth.identification.store import write_estimates
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import modal, scale
@@ -21,7 +22,7 @@ from validation.linear_flight import GTM, as_log, fly
 
 THETA = np.array([4.8, 31.7, 0.48, -1.785, -41.2, -1.787])
 STD = np.array([0.24, 9.5, 0.048, 0.089, 6.2, 0.089])
-POINT = FlightPoint(43.0, 1.0, GTM.wing_area_m2, GTM.chord_m, GTM.mass_kg, GTM.inertia_yy_kg_m2)
+POINT = FlightPoint(43.0, 1.0, values_of(GTM))
 LOG = as_log(fly(runs=3, gust=1.0, noise=1.0, seed=71))
 MODEL = LinearModel(LONGITUDINAL, POINT, THETA, np.diag(STD**2), "a test")
 

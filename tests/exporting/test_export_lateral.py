@@ -5,26 +5,15 @@ import pytest
 
 import airtruth as at
 from airtruth.errors import ConfigurationError
-from airtruth.exporting.model import SYSTEMS, LateralFlightPoint, LinearModel
+from airtruth.exporting.model import SYSTEMS, FlightPoint, LinearModel
 from airtruth.identification import identify, write_estimates
+from airtruth.identification.record_constants import values_of
 from airtruth.physics.motion import LATERAL
 from airtruth.units import G0
 from validation.affine_lateral import ALPHA, DENSITY, GTM, SPEED, THETA, fly, log_of, pitching
 
 PITCH = 0.08
-POINT = LateralFlightPoint(
-    SPEED,
-    DENSITY,
-    GTM.wing_area_m2,
-    GTM.chord_m,
-    GTM.mass_kg,
-    GTM.inertia_yy_kg_m2,
-    {"alpha_rad": ALPHA, "theta_rad": PITCH},
-    span_m=GTM.span_m,
-    inertia_xx_kg_m2=GTM.inertia_xx_kg_m2,
-    inertia_zz_kg_m2=GTM.inertia_zz_kg_m2,
-    inertia_xz_kg_m2=GTM.inertia_xz_kg_m2,
-)
+POINT = FlightPoint(SPEED, DENSITY, values_of(GTM, LATERAL), {"alpha_rad": ALPHA, "theta_rad": PITCH})
 
 
 def rates_and_outputs(x, u):

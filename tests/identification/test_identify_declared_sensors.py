@@ -15,7 +15,7 @@ from airtruth.identification.stored import read_stored
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensor_errors import SensorErrors
-from airtruth.physics.sensors import accelerometer_az, at_instrument, measure, vane_alpha
+from airtruth.physics.sensors import accelerometer_az, at_instrument, measure, vane_equation
 from airtruth.physics.short_period import system
 from airtruth.quantity import Quantity
 from validation.linear_flight import DEG, GTM, THETA, as_log, fly, gtm_scale
@@ -70,7 +70,7 @@ def at_arms(batch):
     q_dot = a[1, 0] * alpha + a[1, 1] * q + b[1] * de
     vane, own = ARMS["alpha_rad"], ARMS["az_m_s2"]
     moved = {
-        "alpha_rad": vane_alpha(c["alpha_rad"], q, vane["x"], c["airspeed_m_s"]),
+        "alpha_rad": vane_equation(c["alpha_rad"], q, vane["x"], c["airspeed_m_s"]),
         "az_m_s2": accelerometer_az(c["az_m_s2"], q_dot, own["x"], q, own["z"]),
     }
     return replace(batch, channels={**c, **moved})
@@ -94,7 +94,7 @@ def test_an_undeclared_vane_costs_what_its_arm_says(true):
     """CLalpha alpha = CLalpha (alpha_vane + q x/V) adds CLalpha 2 x/c to CLq; the lift equation, which counts g/V = 0.2 of
     the normal force, resists. With x = 0.1 m: 3.44 of 30.8."""
     c = true.channels
-    vane = vane_alpha(c["alpha_rad"], c["q_rad_s"], 0.1, c["airspeed_m_s"])
+    vane = vane_equation(c["alpha_rad"], c["q_rad_s"], 0.1, c["airspeed_m_s"])
     off = percent(replace(true, channels={**c, "alpha_rad": vane}), declaring(), "ls")[1] / 100.0 * THETA[1]
     assert off == pytest.approx(THETA[0] * 2.0 * 0.1 / GTM.chord_m, rel=0.15)
 

@@ -1,5 +1,7 @@
 """Increments of readings in sampled signals: states against an integration of their equations, and terms by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -8,6 +10,7 @@ from airtruth.physics.readings import reading_increments, state_of
 from airtruth.physics.terms import ReadingTerm, StateTerm
 
 DT = 0.02
+BODY = SimpleNamespace(chord_m=0.3, span_m=2.0)
 T = np.arange(200) * DT
 SIGNAL = np.interp(T, [0.5, 0.7, 1.1, 1.5], [0.0, 0.03, 0.03, -0.01])
 
@@ -46,7 +49,7 @@ def test_terms_add_by_channel_each_over_its_signal():
         ReadingTerm("q_rad_s", "qhat", "linear", 3.0),
         ReadingTerm("q_rad_s", "bending", "linear", -0.5),
     )
-    more = reading_increments(terms, (state,), truth, chord_m=0.3, dt_s=DT)
+    more = reading_increments(terms, (state,), truth, BODY, dt_s=DT)
     assert set(more) == {"alpha_rad", "q_rad_s"}
     np.testing.assert_allclose(more["alpha_rad"][0], 0.2 * np.maximum(SIGNAL + 0.05 - 0.06, 0.0), atol=1e-15)
     # q c/(2V) = 4 s 0.3/80
@@ -74,7 +77,7 @@ def test_a_lag_that_depends_on_the_dynamic_pressure_is_what_a_state_is_behind_it
     # behind the lag itself, the increment is that of the lag: L_(tau + d) s = L_tau (s + d/tau (L_tau s - s)) + O(d^2)
     lag = StateTerm("lag", "lag", "alpha", tau)
     term = ReadingTerm("alpha_rad", "qbar", "linear", slope / tau, middle, behind="lag")
-    more = reading_increments((term,), (lag,), truth, chord_m=0.3, dt_s=DT)["alpha_rad"]
+    more = reading_increments((term,), (lag,), truth, BODY, dt_s=DT)["alpha_rad"]
     read = state_of(StateTerm("y", "lag", "alpha", tau), SIGNAL[None, :] + more, DT)[0]
     constant = state_of(StateTerm("y", "lag", "alpha", tau), SIGNAL[None, :], DT)[0]
     assert np.abs(exact - constant).max() > 1e-4
@@ -82,7 +85,7 @@ def test_a_lag_that_depends_on_the_dynamic_pressure_is_what_a_state_is_behind_it
 
 
 def test_sensors_without_terms_read_nothing_else():
-    assert reading_increments((), (), {}, 0.3, DT) == {}
+    assert reading_increments((), (), {}, BODY, DT) == {}
 
 
 def test_a_play_rests_until_its_signal_has_moved_by_half_a_width():
@@ -97,5 +100,5 @@ def test_a_lateral_reading_is_over_its_own_signals():
     """Sidewash at the vane: a share of p b/(2V); the channels of the other motion are not needed."""
     p, v = np.linspace(-0.4, 0.4, 5)[None], np.full((1, 5), 40.0)
     term = ReadingTerm("beta_rad", "phat", "above", 0.3, at=0.002)
-    more = reading_increments((term,), (), {"p_rad_s": p, "airspeed_m_s": v}, 0.3, DT, span_m=2.0)
+    more = reading_increments((term,), (), {"p_rad_s": p, "airspeed_m_s": v}, BODY, DT)
     np.testing.assert_allclose(more["beta_rad"], 0.3 * np.maximum(p / 40.0 - 0.002, 0.0), rtol=1e-12)

@@ -191,9 +191,9 @@ def test_arms_against_rotated_frames() -> None:
 
 def test_vane_arm() -> None:
     """Hand value: q 0.2 rad/s, 13 m ahead, V 100 m/s lowers alpha by 0.026 rad; exact: atan((w - q x)/u)."""
-    assert sensors.vane_alpha(0.05, 0.2, 13.0, 100.0) == pytest.approx(0.05 - 0.026, abs=1e-15)
+    assert sensors.vane_equation(0.05, 0.2, 13.0, 100.0) == pytest.approx(0.05 - 0.026, abs=1e-15)
     exact = np.arctan2(100 * np.sin(0.05) - 0.02 * 13.0, 100 * np.cos(0.05))
-    assert sensors.vane_alpha(0.05, 0.02, 13.0, 100.0) == pytest.approx(exact, abs=1e-5)
+    assert sensors.vane_equation(0.05, 0.02, 13.0, 100.0) == pytest.approx(exact, abs=1e-5)
 
 
 def test_lag_against_the_convolution_integral() -> None:
@@ -325,11 +325,11 @@ def test_vanes_off_the_plane_of_symmetry_against_the_flow_at_the_vane() -> None:
     own = v * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     flow = own + np.cross(omega, arm)
     p, q, r = omega
-    alpha_vane = sensors.vane_alpha(alpha, q, 0.5, v) + p * 1.07 / v
+    alpha_vane = sensors.vane_equation(alpha, q, 0.5, v) + p * 1.07 / v
     # the change of the flow is turned by alpha against the vane's axis: cos(alpha), and a forward part
     expected = np.arctan2(flow[2], flow[0])
     assert alpha_vane == pytest.approx(expected, abs=2e-2 * abs(alpha_vane - alpha) + 1e-5)
-    assert sensors.vane_beta(beta, p, r, 0.5, -0.2, v) == pytest.approx(
+    assert sensors.side_vane_equation(beta, p, r, 0.5, -0.2, v) == pytest.approx(
         np.arcsin(flow[1] / np.linalg.norm(flow)), abs=2e-6
     )
 

@@ -154,7 +154,7 @@ def test_draws_and_gusts_of_a_pitch_plane_campaign_are_those_of_earlier_versions
     for name, values in expected.items():
         np.testing.assert_allclose(made.table[name][:3], values, rtol=1e-14)
     air = air_of(made, plan.planned_runs(made.table)[1], 42.0)
-    found = [air.u_m_s[100], air.w_m_s[100], air.q_rad_s[100]]
+    found = [air.u_m_s[100], air.w_m_s[100], air.rotation_rad_s["q_rad_s"][100]]
     np.testing.assert_allclose(
         found, [-0.4378579444731933, -0.06596919047123283, -0.01491144717817038], rtol=1e-10
     )

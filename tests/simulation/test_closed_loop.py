@@ -33,7 +33,7 @@ def doublet(amplitude=0.02):
 def test_damper_moves_the_elevator_with_q_and_its_noise_of_the_same_sample(gtm, paper_trim):
     noise = 6.7e-3 * np.random.default_rng(1).standard_normal(len(T))
     flown = Flight(gtm, paper_trim, DT).fly(
-        Inputs(doublet(), ZERO, ZERO, q_error_rad_s=noise, theta_error_rad=ZERO, damper_gain_s=0.1)
+        Inputs(doublet(), ZERO, ZERO, errors={"q_rad_s": noise, "theta_rad": ZERO}, damper_gain_s=0.1)
     )
     late = np.concatenate([[0.0], doublet()[:-1]])
     expected = paper_trim.elevator_rad + servo(late + 0.1 * (flown["q_rad_s"] + noise))
@@ -90,10 +90,10 @@ def test_damper_damps_and_attitude_hold_holds(gtm, paper_trim):
     t = np.arange(2001) * DT
     zero, gust = np.zeros_like(t), np.where(t >= 0.25, 1.0, 0.0)
     flight = Flight(gtm, paper_trim, DT)
-    errors = {"q_error_rad_s": zero, "theta_error_rad": zero}
+    errors = {"q_rad_s": zero, "theta_rad": zero}
     free = flight.fly(Inputs(zero, zero, gust))
-    damped = flight.fly(Inputs(zero, zero, gust, damper_gain_s=0.2, **errors))
-    held = flight.fly(Inputs(zero, zero, gust, damper_gain_s=0.2, attitude_gain=2.0, **errors))
+    damped = flight.fly(Inputs(zero, zero, gust, damper_gain_s=0.2, errors=errors))
+    held = flight.fly(Inputs(zero, zero, gust, damper_gain_s=0.2, attitude_gain=2.0, errors=errors))
     assert np.std(damped["q_rad_s"]) < 0.8 * np.std(free["q_rad_s"])
     error, alone = (np.abs(x["theta_rad"] - paper_trim.alpha_rad) for x in (held, free))
     assert error.max() < 0.4 * alone.max()
@@ -104,7 +104,17 @@ def test_a_flight_forgets_the_loop_of_the_one_before(gtm, paper_trim):
     plain = Inputs(doublet(), ZERO, ZERO)
     fresh = Flight(gtm, paper_trim, DT).fly(plain)
     flight = Flight(gtm, paper_trim, DT)
-    flight.fly(Inputs(doublet(), ZERO, ZERO + 1.0, ZERO + 0.1, ZERO + 0.1, ZERO + 0.1, 0.1, 0.5))
+    flight.fly(
+        Inputs(
+            doublet(),
+            ZERO,
+            ZERO + 1.0,
+            {"q_rad_s": ZERO + 0.1},
+            {"q_rad_s": ZERO + 0.1, "theta_rad": ZERO + 0.1},
+            0.1,
+            0.5,
+        )
+    )
     flight.fly(Inputs(doublet(), ZERO, ZERO, surface=True))
     again = flight.fly(plain)
     assert again.keys() == fresh.keys()

@@ -56,7 +56,7 @@ def test_gusts_superpose_on_the_flight_path_not_on_the_inertial_state(flight):
 def test_air_that_turns_nose_up_acts_as_turning_nose_down(flight, gtm, paper_trim):
     """A rotary gust of -0.01 rad/s is a pitch rate of 0.01 rad/s in the air: q_dot through the declared Cmq."""
     linear = linearise(gtm, paper_trim)
-    flown = flight.fly(Inputs(ZERO, ZERO, ZERO, gust_q_rad_s=ZERO - 0.01))
+    flown = flight.fly(Inputs(ZERO, ZERO, ZERO, rotation_rad_s={"q_rad_s": ZERO - 0.01}))
     v = paper_trim.airspeed_m_s
     force = 0.5 * paper_trim.density_kg_m3 * v**2 * gtm.wing_area_m2 * gtm.chord_m
     expected = force * linear.plus[4] * (0.01 * gtm.chord_m / (2.0 * v)) / gtm.inertia_yy_kg_m2

@@ -90,10 +90,13 @@ def test_side_gusts_leave_the_gusts_of_the_pitch_plane(tmp_path):
     assert "sigma_v_m_s" not in without.table
     for one, two in zip(plan.planned_runs(with_side.table), plan.planned_runs(without.table), strict=True):
         side, none = air_of(with_side, one, 42.85), air_of(without, two, 42.85)
-        for name in ("u_m_s", "w_m_s", "q_rad_s"):
+        for name in ("u_m_s", "w_m_s"):
             np.testing.assert_array_equal(getattr(side, name), getattr(none, name))
-        assert none.v_m_s is none.p_rad_s is none.r_rad_s is None
-        assert len({float(x[7]) for x in (side.v_m_s, side.w_m_s, side.p_rad_s, side.r_rad_s)}) == 4
+        np.testing.assert_array_equal(*(air.rotation_rad_s["q_rad_s"] for air in (side, none)))
+        turning = side.rotation_of(motion.LATERAL)
+        assert none.v_m_s is None
+        assert not none.rotation_of(motion.LATERAL)
+        assert len({float(x[7]) for x in (side.v_m_s, side.w_m_s, *turning.values())}) == 4
 
 
 def test_the_levels_of_the_side_gusts_are_those_of_the_plan(tmp_path):
@@ -109,7 +112,10 @@ def test_the_levels_of_the_side_gusts_are_those_of_the_plan(tmp_path):
     made = plan.make(file)
     runs = plan.planned_runs(made.table)
     drawn = np.array(
-        [[h[20] for h in (air.v_m_s, air.p_rad_s)] for air in (air_of(made, run, 42.85) for run in runs)]
+        [
+            [h[20] for h in (air.v_m_s, air.rotation_rad_s["p_rad_s"])]
+            for air in (air_of(made, run, 42.85) for run in runs)
+        ]
     )
     sigma_w = made.table["sigma_w_m_s"].iloc[0]
     sigma_p = lateral_gusts.roll_deviation_rad_s(sigma_w, made.table["length_w_m"].iloc[0], 2.08751)
@@ -143,7 +149,7 @@ def test_the_result_shows_both_motions(mixed):
     shown = [ax.get_ylabel() for ax in figure.axes if ax.axison]
     assert shown == [
         "elevator [rad]", "alpha [rad]", "q [rad/s]", "az [m/s2]", "aileron [rad]", "rudder [rad]", "beta [rad]",
-        "phi [rad]", "p [rad/s]", "r [rad/s]", "ay [m/s2]",
+        "p [rad/s]", "r [rad/s]", "phi [rad]", "ay [m/s2]",
     ]  # fmt: skip
 
 

@@ -30,7 +30,7 @@ def own(level):
 def test_both_have_the_same_equilibrium(level, own):
     found = [
         level.alpha_rad,
-        level.controls.sideslip_rad,
+        level.controls.of("beta_rad"),
         level.elevator_rad,
         level.surfaces_rad["aileron"],
         level.surfaces_rad["rudder"],
@@ -43,8 +43,8 @@ def test_both_have_the_same_equilibrium(level, own):
 def test_both_have_the_same_accelerations_off_the_trim(gtm, level, own):
     """Roll and yaw couple through Ixz, whose sign JSBSim takes the other way unless the model says so."""
     executive = Executive(gtm, 1.0 / 200.0)
-    moved = level.controls.moved({"aileron": 0.1, "rudder": 0.1})
-    executive.initialise(level.condition, level.alpha_rad, moved, {"p_rad_s": 0.3, "r_rad_s": -0.2})
+    moved = level.controls.moved({"aileron": 0.1, "rudder": 0.1}, p_rad_s=0.3, r_rad_s=-0.2)
+    executive.initialise(level.condition, moved)
     found = executive.respond()
     state = own.state
     state[3], state[5] = 0.3, -0.2

@@ -60,16 +60,12 @@ def test_the_trim_is_an_equilibrium_of_the_tables(model):
 
 def test_axes_hold_the_trim_and_the_breaks_of_the_tables(paper_trim, model):
     t = model.tables
-    assert paper_trim.alpha_rad in t.alpha_rad
-    assert np.abs(t.elevator_rad - paper_trim.elevator_rad).min() < 1e-15
-    for axis, value in (
-        (t.alpha_rad, 4.0 * DEG),
-        (t.alpha_rad, 6.0 * DEG),
-        (t.elevator_rad, 0.0),
-        (t.q_rad_s, 0.0),
-    ):
+    alpha, elevator, q = t.axes
+    assert paper_trim.alpha_rad in alpha
+    assert np.abs(elevator - paper_trim.elevator_rad).min() < 1e-15
+    for axis, value in ((alpha, 4.0 * DEG), (alpha, 6.0 * DEG), (elevator, 0.0), (q, 0.0)):
         assert np.abs(axis - value).min() < 1e-12
-    assert t.values.shape == (t.airspeed_m_s.size, t.alpha_rad.size, t.elevator_rad.size, t.q_rad_s.size, 3)
+    assert t.values.shape == (t.airspeed_m_s.size, alpha.size, elevator.size, q.size, 3)
 
 
 def test_a_surface_that_feedback_moves_is_refused(gtm, paper_trim, tmp_path):
@@ -78,12 +74,14 @@ def test_a_surface_that_feedback_moves_is_refused(gtm, paper_trim, tmp_path):
     damper = 'model = "gtm"\nset = { "fcs/augmentation/damper-gain-s" = 0.5 }'
     path.write_text(path.read_text().replace('model = "gtm"', damper))
     with pytest.raises(AircraftError, match=r"moves by up to .* deg with alpha, q or airspeed"):
-        probe(aircraft.load(tmp_path / "gtm"), paper_trim, grid_about(paper_trim, 2 * DEG, 2 * DEG, 20 * DEG))
+        probe(
+            aircraft.load(tmp_path / "gtm"), paper_trim, grid_about(paper_trim, (2 * DEG, 2 * DEG, 20 * DEG))
+        )
 
 
 def test_a_command_beyond_the_surface_s_limits_is_refused(gtm, paper_trim):
     with pytest.raises(AircraftError, match="does not rise with its command"):
-        probe(gtm, paper_trim, grid_about(paper_trim, 1 * DEG, 25 * DEG, 12 * DEG))
+        probe(gtm, paper_trim, grid_about(paper_trim, (1 * DEG, 25 * DEG, 12 * DEG)))
 
 
 TURBOPROP = """
@@ -113,7 +111,7 @@ def test_the_tables_of_a_turboprop_have_its_power(tmp_path):
     at = trim(plane, Condition(52.7, 1500.0, 0.0))
     command = at.controls.command("elevator") + np.array([-DEG, 0.0, DEG])
     alpha = at.alpha_rad + np.array([-DEG, 0.0, DEG])
-    tables = probe(plane, at, ForceGrid(alpha, command, np.zeros(1), np.ones(1)))
+    tables = probe(plane, at, ForceGrid((alpha, command, np.zeros(1)), np.ones(1)))
     c = plane.constants
     moment = tables.values[0, :, :, 0, 2] / (
         0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * c.wing_area_m2 * c.chord_m
@@ -121,7 +119,7 @@ def test_the_tables_of_a_turboprop_have_its_power(tmp_path):
     assert abs(moment[1, 1]) < 1e-4
     declared = linearise(plane, at).central
     by_alpha = (moment[2, 1] - moment[0, 1]) / (2.0 * DEG)
-    by_elevator = (moment[1, 2] - moment[1, 0]) / (tables.elevator_rad[2] - tables.elevator_rad[0])
+    by_elevator = (moment[1, 2] - moment[1, 0]) / np.ptp(tables.axes[1])
     assert by_alpha == pytest.approx(declared[3], rel=0.01)
     assert by_elevator == pytest.approx(declared[5], rel=0.01)
 
@@ -137,13 +135,13 @@ def test_the_plant_of_a_propeller_has_its_forces_at_other_angles_and_airspeeds(t
     at = trim(plane, Condition(51.7, 1500.0, 0.0))
     plant = probed(plane, at, (at.alpha_rad, 8.0 * DEG), (at.elevator_rad, at.elevator_rad), 0.1)
     command = np.array([at.controls.command("elevator")])
-    other = ForceGrid(np.array([5.0, 7.5]) * DEG, command, np.zeros(1), np.array([0.94, 1.05]))
+    other = ForceGrid((np.array([5.0, 7.5]) * DEG, command, np.zeros(1)), np.array([0.94, 1.05]))
     tables = probe(plane, at, other)
     states = [(v, a) for v in range(3) for a in range(1, 3)]
-    alpha = tables.alpha_rad[[a for _, a in states]]
+    alpha = tables.axes[0][[a for _, a in states]]
     pressure = 0.5 * at.density_kg_m3 * tables.airspeed_m_s[[v for v, _ in states]] ** 2
     still = np.zeros(len(states))
-    signals = {"alpha": alpha, "elevator": still + tables.elevator_rad[0], "qhat": still}
+    signals = {"alpha": alpha, "elevator": still + tables.axes[1][0], "qhat": still}
     _, z, moment = looked_up(plant, signals, pressure).T
     truth = np.array([tables.values[v, a, 0, 0] for v, a in states])
     assert np.abs(z - truth[:, 1]).max() < 0.001 * at.mass_kg
@@ -200,15 +198,15 @@ def test_the_breaks_of_a_model_whose_tables_are_in_radians():
     plane = aircraft.load("c172x")
     at = trim(plane, Condition(51.44, 1219.2))
     grid = ForceGrid(
-        np.arange(3.0, 9.0) * DEG, np.array([at.controls.command("elevator")]), np.zeros(1), np.ones(1)
+        (np.arange(3.0, 9.0) * DEG, np.array([at.controls.command("elevator")]), np.zeros(1)), np.ones(1)
     )
-    found = with_breaks(plane, at, grid).alpha_rad
+    found = with_breaks(plane, at, grid).axes[0]
     assert max(np.abs(found - x).min() for x in (0.09, 0.10)) < 1e-4
 
 
 def test_tables_in_whole_degrees_add_no_point(gtm, paper_trim):
     grid = grid_about(paper_trim)
-    np.testing.assert_allclose(with_breaks(gtm, paper_trim, grid).alpha_rad, grid.alpha_rad, rtol=0, atol=0)
+    np.testing.assert_allclose(with_breaks(gtm, paper_trim, grid).axes[0], grid.axes[0], rtol=0, atol=0)
 
 
 ALPHA_DOT = """<axis name="{axis}"><function name="aero/by-alpha-dot-{axis}"><product>

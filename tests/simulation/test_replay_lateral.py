@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
-from airtruth.simulation.replay_lateral import replay_lateral
+from airtruth.simulation.replay import replay
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.tracks import Track
 from airtruth.simulation.trim import trim
@@ -56,7 +56,7 @@ def errors(again, measured):
 def test_a_flight_through_its_own_surfaces_comes_back(gtm, level, flown):
     """Up to the airspeed, which the air of the replay follows one step late."""
     own = track(flown)
-    assert max(errors(replay_lateral(gtm, level, own), own.outputs).values()) < 0.01
+    assert max(errors(replay(gtm, level, own), own.outputs).values()) < 0.01
 
 
 def test_biases_and_offsets_of_the_surfaces_are_free(gtm, level, flown):
@@ -64,11 +64,11 @@ def test_biases_and_offsets_of_the_surfaces_are_free(gtm, level, flown):
     outputs = {c: flown[c][::EVERY] + biases[c] for c in CHANNELS}
     controls = {"aileron": flown["aileron_rad"] + 0.004, "rudder": flown["rudder_rad"] - 0.004}
     moved = track(flown, outputs=outputs, controls_rad=controls)
-    assert max(errors(replay_lateral(gtm, level, moved), outputs).values()) < 0.03
+    assert max(errors(replay(gtm, level, moved), outputs).values()) < 0.03
 
 
 def test_a_late_rudder_is_seen(gtm, level, flown):
     """80 ms late: the yaw rate is off by more than a tenth of itself."""
     late = np.concatenate([np.repeat(flown["rudder_rad"][:1], 16), flown["rudder_rad"][:-16]])
     own = track(flown, controls_rad={"aileron": flown["aileron_rad"], "rudder": late})
-    assert errors(replay_lateral(gtm, level, own), own.outputs)["r_rad_s"] > 0.1
+    assert errors(replay(gtm, level, own), own.outputs)["r_rad_s"] > 0.1

@@ -45,7 +45,7 @@ def level(gtm, paper_condition):
 
 def state_of(gtm, at, names):
     executive = Executive(gtm, 1.0 / 200.0)
-    executive.initialise(at.condition, at.alpha_rad, at.controls)
+    executive.initialise(at.condition, at.controls)
     return [executive.fdm[name] for name in names]
 
 
@@ -82,25 +82,25 @@ def test_straight_attitude_holds_the_path(alpha, beta, phi, gamma):
 def test_the_wings_are_level(gtm, level):
     c = level.controls
     assert level.residual < 1e-8
-    assert c.bank_rad == 0.0
+    assert c.of("phi_rad") == 0.0
     # The increments of the rates are not zero at zero rate (NASA's tables): sideslip, aileron and rudder balance them.
     assert [
         round(x / DEG, 2)
-        for x in (c.sideslip_rad, level.surfaces_rad["aileron"], level.surfaces_rad["rudder"])
+        for x in (c.of("beta_rad"), level.surfaces_rad["aileron"], level.surfaces_rad["rudder"])
     ] == [
         -0.05,
         0.08,
         -0.07,
     ]
     names = ("aero/beta-rad", "attitude/phi-rad", "velocities/v-east-fps", "velocities/h-dot-fps")
-    np.testing.assert_allclose(state_of(gtm, level, names), [c.sideslip_rad, 0.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(state_of(gtm, level, names), [c.of("beta_rad"), 0.0, 0.0, 0.0], atol=1e-12)
 
 
 def test_there_is_no_sideslip(gtm, paper_condition):
     at = trim(gtm, replace(paper_condition, straight="no-sideslip"))
     assert at.residual < 1e-8
     names = ("aero/beta-rad", "attitude/phi-rad", "velocities/h-dot-fps")
-    np.testing.assert_allclose(state_of(gtm, at, names), [0.0, at.controls.bank_rad, 0.0], atol=1e-12)
+    np.testing.assert_allclose(state_of(gtm, at, names), [0.0, at.controls.of("phi_rad"), 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("eas_kt", [55, 75, 95])
@@ -145,7 +145,7 @@ def test_an_asymmetric_aircraft_is_trimmed(tmp_path, paper_condition, straight):
     assert at.surfaces_rad["aileron"] == pytest.approx(
         aileron, rel=0.02 if straight == "no-sideslip" else 0.1
     )
-    assert (at.controls.bank_rad == 0.0) == (straight == "wings-level")
+    assert (at.controls.of("phi_rad") == 0.0) == (straight == "wings-level")
 
 
 def test_what_cannot_be_balanced_is_refused(tmp_path, paper_condition):

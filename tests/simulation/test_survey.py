@@ -46,7 +46,7 @@ def test_the_new_folder_has_the_derivatives_of_the_model(surveyed, gtm, paper_tr
 def test_a_glide_has_the_slope_of_drag_over_lift(surveyed, paper_trim):
     at = trim(surveyed.aircraft, paper_trim.condition)
     executive = Executive(surveyed.aircraft, STEP_S)
-    executive.initialise(at.condition, at.alpha_rad, at.controls)
+    executive.initialise(at.condition, at.controls)
     drag, lift = (executive.fdm[f"forces/fw{axis}-aero-lbs"] for axis in "xz")
     assert np.tan(-at.condition.gamma_rad) == pytest.approx(abs(drag / lift), rel=1e-4)
 
@@ -116,7 +116,7 @@ def test_a_propeller_starts_and_its_torque_is_held(tmp_path):
     cessna = new_from_jsbsim("c182", tmp_path / "c182").aircraft
     at = trim(cessna, Condition(45.0, 1500.0))
     executive = Executive(cessna, STEP_S)
-    executive.initialise(at.condition, at.alpha_rad, at.controls)
+    executive.initialise(at.condition, at.controls)
     r = executive.respond()
     assert executive.fdm["propulsion/engine/thrust-lbs"] > 50.0
     assert at.residual < 1e-6

@@ -20,7 +20,7 @@ from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.survey import bench as benches
-from airtruth.simulation.survey.lateral import feedback_rad, with_lateral_controls
+from airtruth.simulation.survey.controls import feedback_rad, with_controls
 from airtruth.simulation.survey.names import names_of
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG, FT, KT
@@ -38,7 +38,7 @@ def found_in(name):
         throttle=ThrottleProperties(command=()),
     )
     names = names_of(model_files(folder / f"{name}.xml", wheel_root()))
-    return with_lateral_controls(benches.bench(folder, model), names)
+    return with_controls(benches.bench(folder, model), names, LATERAL)
 
 
 @pytest.mark.parametrize(
@@ -75,8 +75,8 @@ def test_the_survey_of_the_gtm_recovers_its_lateral_controls(tmp_path):
 def test_a_yaw_damper_with_a_switch_is_switched_off():
     bench, notes, decisions = found_in("global5000")
     assert bench.model.set == {"fcs/yaw-damper-enable": 0.0}
-    assert max(feedback_rad(bench).values()) == 0.0
-    assert any("switches the lateral feedback off" in note for note in notes)
+    assert max(feedback_rad(bench, LATERAL).values()) == 0.0
+    assert any("switches the feedback to the aileron and rudder off" in note for note in notes)
     assert not decisions
 
 

@@ -38,7 +38,7 @@ def test_a_held_throttle_is_balanced_by_the_flight_path(gtm, paper_trim):
     assert climbing.residual < 1e-6
     held = replace(paper_trim, controls=replace(paper_trim.controls, throttle=more))
     executive = Executive(gtm, 1.0 / 200.0)
-    executive.initialise(held.condition, held.alpha_rad, held.controls)
+    executive.initialise(held.condition, held.controls)
     r = executive.respond()
     along = r.u_dot_m_s2 * np.cos(held.alpha_rad) + r.w_dot_m_s2 * np.sin(held.alpha_rad)
     assert np.sin(climbing.condition.gamma_rad) == pytest.approx(along / 9.80665, rel=0.05)

@@ -100,7 +100,7 @@ def test_gusts_in_the_loop_spare_the_filter_with_gusts_in_its_model(affine, affi
 @pytest.mark.long
 def test_nonlinear_auxiliary_changes_nothing_where_the_aircraft_is_affine(affine, affine_trim):
     batch = study.fly(affine.folder, study.Level(0.0, 1.0, 1.0), 20, 5)
-    model = model_of(affine, affine_trim, grid_about(affine_trim, 8 * DEG, 4 * DEG, 48 * DEG))
+    model = model_of(affine, affine_trim, grid_about(affine_trim, (8 * DEG, 4 * DEG, 48 * DEG)))
     plain = Options(covariance="none", tolerance=1e-4)
     linear = identify_batch(batch, affine, "iv-f1", plain)
     declared = linearise(affine, affine_trim).plus

@@ -40,7 +40,7 @@ def test_a_two_state_model_takes_alpha_dot_into_cmq(tmp_path):
 def test_errors_of_lift_come_from_the_airspeed(tmp_path):
     """f16: CLalpha errs by more than 1 % in flight and by less than 0.2 % where the airspeed is held."""
     flight = flown("f16", tmp_path)
-    grid = foreign.grid_about(flight.trim, 3 * foreign.DEG, 3 * foreign.DEG, 24 * foreign.DEG)
+    grid = foreign.grid_about(flight.trim, (3 * foreign.DEG, 3 * foreign.DEG, 24 * foreign.DEG))
     model = foreign.model_of(flight.aircraft, flight.trim, grid)
     errors = [
         foreign.estimate(flight, "iv-f1", foreign.simulated(replace(model, drift=drift), flight))[0]

@@ -26,7 +26,7 @@ def planes(theta=THETA, drift=0.0):
     lift = theta[0] * a + theta[1] * h * r + theta[2] * e
     moment = theta[3] * a + theta[4] * h * r + theta[5] * e
     values = np.stack([0.0 * a, -MASS * (G0 + s.normal[0] * lift), INERTIA * s.moment[0] * moment], axis=-1)
-    tables = ForceTables(AIRSPEED * np.array([0.9, 1.1]), alpha, elevator, q, np.stack([values, values]))
+    tables = ForceTables(AIRSPEED * np.array([0.9, 1.1]), (alpha, elevator, q), np.stack([values, values]))
     return Longitudinal(tables, MASS, INERTIA, G0, AIRSPEED, 0.0, 0.0, 0.0, drift)
 
 
@@ -69,7 +69,8 @@ def test_small_motion_about_a_climb_with_a_deflected_elevator():
     values = level.tables.values.copy()
     values[..., 0] += MASS * G0 * np.sin(gamma)
     values[..., 1] += MASS * G0 * (1.0 - np.cos(gamma))
-    tables = replace(level.tables, elevator_rad=level.tables.elevator_rad + elevator, values=values)
+    alpha, surface, q = level.tables.axes
+    tables = replace(level.tables, axes=(alpha, surface + elevator, q), values=values)
     u = 1e-6 * doublet()
     climb = replace(level, tables=tables, elevator_rad=elevator, gamma_rad=gamma)
     motion = simulate(climb, elevator + u[None], 0.02)
@@ -103,7 +104,7 @@ def test_phugoid_has_lanchester_s_period():
     values[..., 1] = -(lift[:, None] * np.cos(alpha))[..., None, None]
     kick = np.array([0.0, 1.0])
     values[:, :, 1, :, 1] *= 1.05  # the elevator adds lift, for one second
-    tables = ForceTables(v, alpha, kick, np.array([-1.0, 1.0]), values)
+    tables = ForceTables(v, (alpha, kick, np.array([-1.0, 1.0])), values)
     model = Longitudinal(tables, MASS, INERTIA, G0, AIRSPEED, 0.0, 0.0, 0.0)
     dt = 0.05
     elevator = np.where(np.arange(1200) * dt < 1.0, 0.1, 0.0)

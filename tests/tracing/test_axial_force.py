@@ -130,7 +130,7 @@ def test_readings_that_a_trace_learned_are_undone(clean, term, state):
         name: log.channels[name][None, :] for name in ("alpha_rad", "elevator_rad", "q_rad_s", "airspeed_m_s")
     }
     signals["density_kg_m3"] = air_density(log.channels)[None, :]
-    more = reading_increments(change.readings, change.states, signals, plane.constants.chord_m, plain.dt_s)
+    more = reading_increments(change.readings, change.states, signals, plane.constants, plain.dt_s)
     expected = plain.signals["alpha"] - more["alpha_rad"][0]
     np.testing.assert_allclose(undone.signals["alpha"], expected, rtol=0, atol=1e-12)
     assert np.abs(more["alpha_rad"]).max() > 1e-4

@@ -10,7 +10,7 @@ from airtruth import aircraft as planes
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.lateral import lateral_system
 from airtruth.physics.motion import LATERAL
-from airtruth.physics.sensors import rotation_acceleration, vane_beta
+from airtruth.physics.sensors import rotation_acceleration, side_vane_equation
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, SensorTerm, SurfaceTerm
 from airtruth.tracing.compensate import (
     Compensation,
@@ -38,7 +38,7 @@ def taken(**changed):
 
 def test_a_boom_is_undone_with_both_rates():
     beta, p, r = 0.05 * np.sin(2.0 * T), 0.4 * np.cos(3.0 * T), 0.2 * np.sin(T)
-    vane = vane_beta(beta, p, r, 1.5, 0.3, SPEED)
+    vane = side_vane_equation(beta, p, r, 1.5, 0.3, SPEED)
     terms = (SensorTerm("beta_rad", "arm", 1.5), SensorTerm("beta_rad", "arm_down", 0.3))
     found = compensated_log(log(beta_rad=vane, p_rad_s=p, r_rad_s=r), GTM, taken(sensors=terms))
     np.testing.assert_allclose(found.channels["beta_rad"], beta, atol=2e-5)

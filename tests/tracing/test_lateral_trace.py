@@ -7,7 +7,7 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.physics.motion import MOTIONS
-from airtruth.simulation.linearise import lateral_truth, linearise
+from airtruth.simulation.linearise import linearise, truth_of
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing import TraceOptions
@@ -106,7 +106,7 @@ def test_the_update_of_an_aircraft_without_a_jsbsim_model_flies_with_the_effect(
     assert answer.updated_aircraft is not None
     updated = aircraft.load(answer.updated_aircraft)
     found = trim(updated, Condition(38.6, 2134.0, straight="wings-level"))
-    true = lateral_truth(linearise(updated, found, motion=MOTIONS["lateral"]), found)
+    true = truth_of(MOTIONS["lateral"], linearise(updated, found, motion=MOTIONS["lateral"]), found)
     after = answer.derivatives.after
     assert {k: true[k] for k in ("Clp", "Cnbeta", "Cndr")} == pytest.approx(
         {k: after[k] for k in ("Clp", "Cnbeta", "Cndr")}, rel=0.01

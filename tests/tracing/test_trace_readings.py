@@ -75,8 +75,8 @@ def test_the_filter_changes_the_lag_of_the_vane_with_the_dynamic_pressure():
         "airspeed_m_s": speed[None, :: s.sub],
         "density_kg_m3": s.density_kg_m3[None, :: s.sub],
     }
-    chord = one.plant.aircraft.constants.chord_m
-    expected = reading_increments(change.readings, change.states, truth, chord, s.dt_s)["alpha_rad"][0]
+    constants = one.plant.aircraft.constants
+    expected = reading_increments(change.readings, change.states, truth, constants, s.dt_s)["alpha_rad"][0]
     moved = read(problem, Change()) - read(problem, change)
     assert np.abs(expected).max() > 1e-4
     np.testing.assert_allclose(moved[:, 0], expected, atol=0.02 * np.abs(expected).max())

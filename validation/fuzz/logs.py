@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from airtruth.aircraft import Aircraft, load
-from airtruth.checks.kinematics import check_log
+from airtruth.checks.motions import check_motions
 from airtruth.identification import identify
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.sources import named_logs
@@ -103,7 +103,7 @@ def use(path: Path, rng: Random, *, every: bool = False) -> None:
     methods = METHODS if every else ("ls", *rng.sample(METHODS[1:], 1))
     identify(log, plane(), methods, force=force)
     if every or rng.random() < 0.2:
-        check_log(log, plane(), source=str(path), force=force)
+        check_motions([(str(path), log)], plane(), force=force)
 
 
 def damaged_log(rng: Random) -> bytes:

@@ -19,7 +19,7 @@ from airtruth.aircraft.file import FILE, Aircraft
 from airtruth.aircraft.jsbsim.short_period import TrimPoint
 from airtruth.aircraft.origin import UNKNOWN, Origin
 from airtruth.aircraft.write import changed
-from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.physics.terms import QBAR, Change, declared_total, signals_of, term_value
 from airtruth.quantity import Quantity
 
@@ -43,21 +43,23 @@ def reference_point(
     """
     c = aircraft.constants
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    factor, mass = declared_total(change.declared, "elevator"), declared_total(change.declared, "mass")
+    (control,), (force, turn) = LONGITUDINAL.controls, (c.name for c in LONGITUDINAL.coefficients)
+    factor, mass = declared_total(change.declared, control.name), declared_total(change.declared, "mass")
     normal = -mass * c.mass_kg * at.az_m_s2 / (pressure * c.wing_area_m2)
     surface = factor * at.elevator_rad
     steady = {name: 0.0 for motion in MOTIONS.values() for name in signals_of(motion)}
-    steady |= {"alpha": at.alpha_rad, "elevator": surface, QBAR: pressure}
+    steady |= {LONGITUDINAL.flow: at.alpha_rad, control.name: surface, QBAR: pressure}
     signals = {name: np.asarray(value) for name, value in steady.items()}
     signals |= {state.name: signals[state.signal] for state in change.states}
     added = {
         name: float(sum(term_value(t, signals) for t in change.aero if t.coefficient == name))
-        for name in ("CL", "Cm")
+        for name in (force, turn)
     }
-    moment = added["Cm"] + normal * declared_total(change.declared, "cg")
-    elevator = surface + (moment / derivatives["Cmde"] if derivatives["Cmde"] else 0.0)
-    lift = normal - added["CL"] - derivatives["CLde"] * (surface - elevator)
-    return replace(at, elevator_rad=elevator, az_m_s2=at.az_m_s2 * mass * lift / normal)
+    moment = added[turn] + normal * declared_total(change.declared, "cg")
+    by_lift, by_moment = (derivatives[name + control.symbol] for name in (force, turn))
+    reference = surface + (moment / by_moment if by_moment else 0.0)
+    lift = normal - added[force] - by_lift * (surface - reference)
+    return replace(at, elevator_rad=reference, az_m_s2=at.az_m_s2 * mass * lift / normal)
 
 
 def write_corrected(

@@ -52,12 +52,11 @@ def trim_point(log: FlightLog, window_s: float = TRIM_WINDOW_S) -> TrimPoint:
         rows.append(np.arange(part.start, last))
     index = np.concatenate(rows)
     start = {name: values[index] for name, values in log.channels.items()}
+    vane, _, normal = LONGITUDINAL.output_channels
     return TrimPoint(
-        airspeed_m_s=float(start["airspeed_m_s"].mean()),
-        density_kg_m3=float(air_density(start).mean()),
-        alpha_rad=float(start["alpha_rad"].mean()),
-        elevator_rad=float(start["elevator_rad"].mean()),
-        az_m_s2=float(start["az_m_s2"].mean()),
+        float(start["airspeed_m_s"].mean()),
+        float(air_density(start).mean()),
+        *(float(start[name].mean()) for name in (vane, *LONGITUDINAL.surfaces, normal)),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Final, get_args
 
 from pydantic import ValidationError
 
@@ -12,13 +12,11 @@ from airtruth.aircraft.file import FILE, Aircraft, AircraftFile
 from airtruth.aircraft.probe import Constants, probe
 from airtruth.documents import read_toml
 from airtruth.errors import AircraftError, choices
+from airtruth.physics.motion_parts import Reference
 
-_AGREE: Final = (
-    "wing_area_m2",
-    "chord_m",
-    "mass_kg",
-    *(f"inertia_{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xz")),
-)
+_INERTIAS: Final = tuple(f"inertia_{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xz"))
+"""Moments and product of inertia."""
+_AGREE: Final = ("wing_area_m2", f"{get_args(Reference)[0]}_m", "mass_kg", *_INERTIAS)
 """Constants in which aircraft.toml and the JSBSim model have to agree."""
 
 
@@ -107,21 +105,15 @@ def load(name: str | Path, near: Path | None = None) -> Aircraft:
 def _constants(file: AircraftFile, model: Constants | None) -> Constants:
     base = model.model_dump() if model else {"cg_fraction": 0.25}
     if file.geometry:
-        base |= {
-            "wing_area_m2": file.geometry.wing_area.value,
-            "chord_m": file.geometry.chord.value,
-            "span_m": file.geometry.span.value,
-        }
+        lengths = {f"{name}_m": getattr(file.geometry, name).value for name in get_args(Reference)}
+        base |= {"wing_area_m2": file.geometry.wing_area.value, **lengths}
     if file.mass:
         base |= {
             "mass_kg": file.mass.mass.value,
-            "inertia_yy_kg_m2": file.mass.inertia_yy.value,
             "cg_fraction": file.mass.cg.value,
         }
-        further = {
-            f"inertia_{axes}_kg_m2": getattr(file.mass, f"inertia_{axes}") for axes in ("xx", "zz", "xz")
-        }
-        base |= {name: stated.value for name, stated in further.items() if stated is not None}
+        inertias = {name: getattr(file.mass, name.removesuffix("_kg_m2")) for name in _INERTIAS}
+        base |= {name: stated.value for name, stated in inertias.items() if stated is not None}
     constants = Constants.model_validate(base)
     if model and (file.geometry or file.mass):
         for field in _AGREE:

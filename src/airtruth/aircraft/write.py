@@ -17,7 +17,6 @@ from airtruth.aircraft.dynamics import with_change
 from airtruth.aircraft.jsbsim import changes as changes_xml
 from airtruth.aircraft.jsbsim import files as model_files
 from airtruth.aircraft.jsbsim import mass_balance as declared_xml
-from airtruth.aircraft.jsbsim.mass_balance import Masses
 from airtruth.aircraft.neutral import effective, fitted
 from airtruth.aircraft.origin import MARK, UNKNOWN, Origin, Term, number_of
 from airtruth.aircraft.toml_patch import patched
@@ -201,15 +200,7 @@ def _write_model(
     read = model_files.read(plane.folder, model)
     model_files.copy(read, out)
     root, where = read.root, f"{plane.name} ({read.source.name})"
-    constants = plane.constants
-    masses = Masses(
-        mass_kg=constants.mass_kg,
-        inertia_kg_m2=constants.inertia_yy_kg_m2,
-        chord_m=constants.chord_m,
-        inertia_xx_kg_m2=constants.inertia_xx_kg_m2,
-        inertia_zz_kg_m2=constants.inertia_zz_kg_m2,
-    )
-    declared_xml.write(root, change.declared, masses, where)
+    declared_xml.write(root, change.declared, plane.constants, where)
     changes_xml.write(root, model, change.in_motion, where, highest_hz, origin)
     if change.in_aircraft or change.readings:
         declared = [f"{t.quantity}: {number_of(t)!r}{origin.words(t)}" for t in change.declared]

@@ -8,9 +8,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import ATTITUDE
 from airtruth.numerics.local_level import smoothed, walk_to_noise
 from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.sensors import ACCELEROMETERS
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -195,7 +197,7 @@ def _path_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
     alpha = channels[LONGITUDINAL.vane]
     along = -G0 * np.sin(theta - alpha)
     if "ax_m_s2" in channels:
-        along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
+        along = along + channels["ax_m_s2"] * np.cos(alpha) + channels[ACCELEROMETERS[2]] * np.sin(alpha)
     return np.asarray(along)
 
 
@@ -204,12 +206,12 @@ def _banked_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
 
     Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1 (V').
     """
-    alpha, beta, phi = channels[LONGITUDINAL.vane], channels[LATERAL.vane], channels["phi_rad"]
+    alpha, beta, phi = channels[LONGITUDINAL.vane], channels[LATERAL.vane], channels[ATTITUDE[1]]
     along = np.stack([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     gravity = np.stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
     total = G0 * (along * gravity).sum(axis=0)
     if "ax_m_s2" in channels:
-        for part, name in zip(along, ("ax_m_s2", "ay_m_s2", "az_m_s2"), strict=True):
+        for part, name in zip(along, ACCELEROMETERS, strict=True):
             total = total + part * channels.get(name, 0.0)
     return np.asarray(total)
 

@@ -138,11 +138,13 @@ def reconstructed(log: FlightLog) -> Iterator[Fault]:
     """An angle of attack that no vane measured, which the import marks by the columns of its errors."""
     if not is_reconstructed(log.channels):
         return
+    vane, *measured = LONGITUDINAL.output_channels
+    others = " and ".join(measured)
     yield Fault(
-        "alpha_rad", log.run_ids, "reconstructed",
-        "alpha_rad: reconstructed from inertial measurements and airspeed, no vane was recorded: gusts are not in it, it "
-        "agrees with q_rad_s and az_m_s2 by construction, and no error of a vane can be estimated; identify adds its "
-        "uncertainty to the intervals, trace takes q_rad_s and az_m_s2 as outputs and alpha as a state", False, 1.0,
+        vane, log.run_ids, "reconstructed",
+        f"{vane}: reconstructed from inertial measurements and airspeed, no vane was recorded: gusts are not in it, it "
+        f"agrees with {others} by construction, and no error of a vane can be estimated; identify adds its "
+        f"uncertainty to the intervals, trace takes {others} as outputs and alpha as a state", False, 1.0,
     )  # fmt: skip
 
 

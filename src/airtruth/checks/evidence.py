@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.channels import ATTITUDE
 from airtruth.checks.evidence_lateral import lateral
 from airtruth.checks.excitation import LEAST_TURN_RAD, moves, swing
 from airtruth.checks.factors import (
@@ -36,7 +37,7 @@ from airtruth.checks.factors import (
 from airtruth.checks.means import LEVEL, LIMITS, air, gravity, ranges
 from airtruth.checks.relation import Relation
 from airtruth.checks.rotation import across_flow, alpha_coupling, pitched
-from airtruth.checks.slopes import slopes_near_trim
+from airtruth.checks.slopes import CONTROL_POWER, slopes_near_trim
 from airtruth.checks.spectra import Factors, instruments, integral, regress
 from airtruth.checks.together import Runs
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
@@ -44,6 +45,7 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
+_, BANK, _ = ATTITUDE
 
 
 def relations(runs: Runs, aircraft: Aircraft | None = None) -> list[Relation]:
@@ -78,7 +80,8 @@ def motion(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
     if "theta_rad" in names:
         turned = runs.spectra(pitched)
         factors = regress(runs.spectra_of("theta_rad")[:, 0], turned[:, None], lines=lines)
-        banked = tuple(n for n in ("phi_rad", "r_rad_s") if {"phi_rad", "r_rad_s"} <= names)
+        turning = (BANK, LATERAL.gyros[-1])
+        banked = turning if names.issuperset(turning) else ()
         test = follows_test("theta", (rate, "theta_rad", *banked), factors, THETA_STD)
         result.append(of_moving(test, _pitches(runs)) if banked else test)
     if vane in names:
@@ -124,7 +127,9 @@ def _inertial_alpha(c: Channels, dt_s: float) -> Array:
     """
     pitch = pitched(c, dt_s)
     attitude = c.get("theta_rad", pitch)
-    return pitch + integral((c["az_m_s2"] + G0 * np.cos(attitude)) / c["airspeed_m_s"], dt_s)
+    return pitch + integral(
+        (c[LONGITUDINAL.outputs[-1].channel] + G0 * np.cos(attitude)) / c["airspeed_m_s"], dt_s
+    )
 
 
 def _alpha_relation(runs: Runs, lines: NDArray[np.int64]) -> Relation:
@@ -138,8 +143,8 @@ def _alpha_relation(runs: Runs, lines: NDArray[np.int64]) -> Relation:
         level = alpha.mean(axis=1, keepdims=True) - pitch.mean(axis=1, keepdims=True)
         attitude = theta if theta is not None else pitch + level
         force = across_flow(az, ax, alpha, attitude)
-        if "phi_rad" in c:
-            force = force - G0 * np.cos(alpha) * np.cos(attitude) * (1.0 - np.cos(c["phi_rad"]))
+        if BANK in c:
+            force = force - G0 * np.cos(alpha) * np.cos(attitude) * (1.0 - np.cos(c[BANK]))
         return integral(force / c["airspeed_m_s"], dt_s)
 
     angle = runs.spectra_of(LONGITUDINAL.vane)[:, 0]
@@ -156,12 +161,13 @@ def _alpha_relation(runs: Runs, lines: NDArray[np.int64]) -> Relation:
     return found
 
 
-OF_ELEVATOR: Final = ("elevator", "Cmde")
+OF_ELEVATOR: Final = (*(control.name for control in LONGITUDINAL.controls), CONTROL_POWER)
 """Tests of what the elevator does, to which a record counts only if its elevator moves."""
 
 
 def _alpha_test(factors: Factors) -> Relation:
-    channels = ("alpha_rad", "airspeed_m_s", "az_m_s2", "q_rad_s", "theta_rad")
+    vane, rate, normal = LONGITUDINAL.output_channels
+    channels = (vane, "airspeed_m_s", normal, rate, "theta_rad")
     return factor_test("alpha", channels, factors, ALPHA_STD)
 
 

@@ -25,9 +25,10 @@ from airtruth.checks.evidence import relations
 from airtruth.checks.excitation import turned
 from airtruth.checks.means import LIMITS, ranges
 from airtruth.checks.relation import Relation
+from airtruth.checks.slopes import TYPICAL
 from airtruth.checks.stated import Stated
 from airtruth.checks.together import Runs
-from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 
 Array = NDArray[np.float64]
 
@@ -44,12 +45,18 @@ PARTIAL: Final = 6.0
 
 Columns are mapped once for all runs of a log (judgement), and gusts shift the estimates of a single run.
 """
-DECLARED: Final = {
-    "CLalpha": ("mass", "wing_area", "CLalpha"),
-    "Cmde": ("inertia_yy", "wing_area", "chord", "Cmde"),
-}
+
+
+def _numbers(derivative: str) -> tuple[str, ...]:
+    """Entries of aircraft.toml that a derivative and its slope in a record need."""
+    coefficient = LONGITUDINAL.coefficients[LONGITUDINAL.derivatives[LONGITUDINAL.index(derivative)].row]
+    inertias = (d.entry for d in LONGITUDINAL.declared if coefficient.name in d.divides)
+    return (*inertias, "wing_area", *filter(None, [coefficient.length]), derivative)
+
+
+DECLARED: Final = {derivative: _numbers(derivative) for derivative in TYPICAL}
 """Tests that compare a record with declared numbers -> those numbers in aircraft.toml."""
-AERODYNAMIC: Final = ("elevator", "ax_slope")
+AERODYNAMIC: Final = (*(control.name for control in LONGITUDINAL.controls), "ax_slope")
 """Tests that take alpha and q as right; the others are kinematic."""
 MOST_RUNS: Final = 12
 """Runs that are tested with each correction; more would cost time and add no certainty."""

@@ -53,13 +53,13 @@ def follows_test(name: str, channels: tuple[str, ...], factors: Factors, std: fl
     return replace(test, distance=np.maximum(test.distance, finite(unclear)), informed=informed)
 
 
-def nearer(by_elevator: Relation, by_command: Relation, is_strong: NDArray[np.bool_]) -> Relation:
+def nearer(by_surface: Relation, by_command: Relation, is_strong: NDArray[np.bool_]) -> Relation:
     """The relation with the smaller distance of two instruments, where the command is a strong one.
 
     A damper moves the elevator with the gusts that move alpha. The elevator is no valid instrument then; the pilot's command is.
     """
-    smaller = np.minimum(by_elevator.distance, by_command.distance)
-    return replace(by_elevator, distance=np.where(is_strong, smaller, by_elevator.distance))
+    smaller = np.minimum(by_surface.distance, by_command.distance)
+    return replace(by_surface, distance=np.where(is_strong, smaller, by_surface.distance))
 
 
 def sign_test(name: str, channels: tuple[str, ...], control: Factors) -> Relation:

@@ -23,7 +23,7 @@ from airtruth.errors import LogError
 from airtruth.logs.flight_log import PRESCRIBED, Batch, FlightLog, batches
 from airtruth.logs.validate import validate
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.reconstruction import is_reconstructed
+from airtruth.physics.reconstruction import NEEDED, is_reconstructed
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -220,9 +220,9 @@ def _drift(several: Runs, count: int) -> Iterator[Fault]:
     for test in ranges(alpha):
         ids = tuple(several.run_ids[i] for i in np.flatnonzero(test.distance[:-1]))
         yield Fault(
-            "alpha_rad", ids, "impossible",
-            f"alpha_rad: reconstructed, in {runs(ids, count)}: {evidence(test)}: the channels that it was computed from "
-            "(airspeed_m_s, q_rad_s, az_m_s2, and where mapped ax_m_s2, theta_rad, altitude_m) contradict each other, or the "
+            LONGITUDINAL.vane, ids, "impossible",
+            f"{LONGITUDINAL.vane}: reconstructed, in {runs(ids, count)}: {evidence(test)}: the channels that it was computed "
+            f"from ({', '.join(NEEDED)}, and where mapped ax_m_s2, theta_rad, altitude_m) contradict each other, or the "
             "record is too long for their errors; cut it to one manoeuvre, and check their units and signs", True, OUTSIDE,
         )  # fmt: skip
 
@@ -381,13 +381,12 @@ def _over(
 
 def _unrelated(several: Runs, failed: Relation) -> bool:
     """Whether theta and q have nothing in common although the wings are level: a turn has more load."""
-    if failed.name != "theta" or "az_m_s2" not in several.channels:
+    *_, normal = LONGITUDINAL.output_channels
+    if failed.name != "theta" or normal not in several.channels:
         return False
-    load = float(np.median(several.each(lambda c, dt_s: np.median(c["az_m_s2"], axis=1)))) / -G0
-    if load > LEVEL_LOAD:
-        return False
+    load = float(np.median(several.each(lambda c, dt_s: np.median(c[normal], axis=1)))) / -G0
     _, std, share, _ = failed.figures[-1]
-    return bool(share < UNRELATED and std < UNRELATED_STD)
+    return bool(load <= LEVEL_LOAD and share < UNRELATED and std < UNRELATED_STD)
 
 
 def _commanded(several: Runs) -> bool:

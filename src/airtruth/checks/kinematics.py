@@ -9,24 +9,19 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.aircraft import Aircraft
-from airtruth.checks import poor
-from airtruth.checks.gate import admit
+from airtruth.channels import ATTITUDE as ATTITUDES
 from airtruth.checks.kinematics_findings import bias_of, concluded, drift, errors_of
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, LongitudinalSamples, thinned
 from airtruth.checks.kinematics_record import (
-    LONGEST_ARM_M,
     USUAL_ARM_M,
-    declared_biases,
-    declared_errors,
     records_of,
 )
 from airtruth.checks.kinematics_search import ErrorSearch, completed, search
 from airtruth.checks.kinematics_vaneless import COMPUTED, WITHOUT_ATTITUDE, untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED
 from airtruth.checks.result import CheckResult, Finding
-from airtruth.logs.flight_log import FlightLog, batches
+from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.validate import validate
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.motion import LONGITUDINAL as MOTION
@@ -35,10 +30,7 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-LONGEST_ARM_CHORDS: Final = 7.0
-"""Largest arm [chords]: judgement; the nose boom of ATTAS is 4.1 chords ahead of the CG, and the fuselage of a Boeing
-747 is 8.5 chords long."""
-ROTATION: Final = (*LATERAL.gyros, "phi_rad", LATERAL.vane)
+ROTATION: Final = (*LATERAL.gyros, ATTITUDES[1], LATERAL.vane)
 """Channels without one of which the wings count as level."""
 AIRSPEED: Final = ("sensor_delay:airspeed_m_s", "airspeed_alpha_slope")
 """Errors that the equation of airspeed shows."""
@@ -46,51 +38,10 @@ ATTITUDE: Final = ("gyro_lag", "attitude_lag", "sensor_delay:theta_rad", "sensor
 """Errors that need theta, because without it nothing predicts q but alpha, whose own errors are the same."""
 
 
-def check_log(
-    log: FlightLog, aircraft: Aircraft | None = None, *, source: str = "", force: bool = False
-) -> CheckResult:
-    """Pass a log through the gate, then estimate the errors of its instruments; see `check_logs`."""
-    return check_logs([(source, log)], aircraft, force=force)
-
-
-def check_logs(
-    logs: Sequence[tuple[str, FlightLog]], aircraft: Aircraft | None = None, *, force: bool = False
-) -> CheckResult:
-    """Pass logs through the gate, then estimate the errors of their instruments, common to all.
-
-    Parameters
-    ----------
-    logs : logs of one instrumentation, each with its name in messages, usually its file.
-    aircraft : aircraft whose declared sensor errors are known; None assumes ideal sensors.
-    force : continue although a log contradicts physics; the result lists the faults.
-
-    Raises
-    ------
-    LogError
-        As `airtruth.checks.gate.admit` and `check_kinematics`.
-    """
-    admitted = [admit(log, aircraft, source=name, force=force) for name, log in logs]
-    parts = [one.log for one in admitted]
-    result = (
-        check_kinematics(parts)
-        if aircraft is None
-        else check_kinematics(
-            parts,
-            declared_errors(aircraft, LONGITUDINAL),
-            aircraft.chord_m,
-            declared_biases(aircraft, LONGITUDINAL),
-        )
-    )
-    remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
-    doubts = poor.words([one for log in parts for batch in batches(log) for one in poor.measured(batch)])
-    forced = tuple(sentence for one in admitted for sentence in one.forced)
-    return replace(result, sentences=(*doubts, *result.sentences, *remarks), forced=forced)
-
-
 def check_kinematics(
     log: FlightLog | Sequence[FlightLog],
     declared: Mapping[str, float] | None = None,
-    chord_m: float | None = None,
+    length_m: float | None = None,
     biases: Mapping[str, float] | None = None,
 ) -> CheckResult:
     """Estimate the errors of sensors from all runs together; the gate is not passed.
@@ -102,7 +53,8 @@ def check_kinematics(
     log : flight log, or several; of many runs the first `kinematics_record.MOST_RECORDS` with an elevator that moves are taken.
     declared : instrument errors that are known, names of
         `airtruth.checks.kinematics_model.ERRORS` in SI; see `airtruth.checks.kinematics_record.declared_errors`.
-    chord_m : mean aerodynamic chord, which limits arms to `LONGEST_ARM_CHORDS` [m]; None takes that of the log.
+    length_m : reference length, which limits arms, see `airtruth.checks.kinematics_record.Kinematics.longest` [m]; None takes
+        that of the log.
     biases : channel -> bias that is known [unit of the channel]; see `declared_biases` there.
 
     Raises
@@ -114,9 +66,9 @@ def check_kinematics(
     for one in logs:
         validate(one)
     records, remarks = _records(logs)
-    chord = chord_m or _chord_of(logs)
-    usual = _candidates(records, chord)
-    limits = limits_of(records, LONGEST_ARM_M if chord is None else LONGEST_ARM_CHORDS * chord)
+    length = length_m or _length_of(logs)
+    usual = _candidates(records, length)
+    limits = limits_of(records, LONGITUDINAL.longest_arm_m(length))
     known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
     computed = any(is_reconstructed(one.channels) for one in logs)
     if computed and records[0].theta is None:
@@ -131,9 +83,10 @@ def check_kinematics(
     result = concluded(found, found, findings)
     if computed:
         result = without_vane(result)
-    elif chord is None:
+    elif length is None:
+        reference, longest = LONGITUDINAL.reference, LONGITUDINAL.longest_arm_m(None)
         remarks.append(
-            f"No chord is known: arms up to {LONGEST_ARM_M:g} m are allowed; --aircraft narrows them."
+            f"No {reference} is known: arms up to {longest:g} m are allowed; --aircraft narrows them."
         )
     return replace(result, sentences=(*result.sentences, *remarks))
 
@@ -158,24 +111,24 @@ def _records(logs: Sequence[FlightLog]) -> tuple[list[LongitudinalSamples], list
     return records, remarks
 
 
-def _chord_of(logs: Sequence[FlightLog]) -> float | None:
-    """Chord that the logs state for their runs [m]; None if none does."""
+def _length_of(logs: Sequence[FlightLog]) -> float | None:
+    """Reference length that the logs state for their runs [m]; None if none does."""
     for log in logs:
         table = log.metadata.get("record_constants", {})
         for constants in table.values() if isinstance(table, Mapping) else ():
-            value = constants.get("chord_m") if isinstance(constants, Mapping) else None
+            value = constants.get(f"{LONGITUDINAL.reference}_m") if isinstance(constants, Mapping) else None
             if isinstance(value, int | float) and value > 0.0:
                 return float(value)
     return None
 
 
-def _candidates(records: Sequence[LongitudinalSamples], chord_m: float | None) -> dict[str, float]:
+def _candidates(records: Sequence[LongitudinalSamples], length_m: float | None) -> dict[str, float]:
     """Errors that the channels can show, with their usual sizes [SI]."""
     result = {}
     for name, error in ERRORS.items():
         if name in AIRSPEED or (name in ATTITUDE and records[0].theta is None):
             continue
-        arm = USUAL_ARM_M if chord_m is None else error.usual * chord_m
+        arm = USUAL_ARM_M if length_m is None else error.usual * length_m
         result[name] = arm if error.kind == "arm" else error.usual
     return result
 
@@ -244,6 +197,4 @@ __all__ = [
     "AIRSPEED",
     "NAMED",
     "check_kinematics",
-    "check_log",
-    "check_logs",
 ]

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from airtruth.channels import ATTITUDE
 from airtruth.checks.kinematics_energy import by_equation
 from airtruth.checks.kinematics_findings import bias_of, concluded, drift, errors_of
 from airtruth.checks.kinematics_fit import KinematicProblem, limits_of, problem_of
 from airtruth.checks.kinematics_lines import lines_of
-from airtruth.checks.kinematics_record import LONGEST_ARM_M, USUAL_ARM_M, records_of, thinned
+from airtruth.checks.kinematics_record import USUAL_ARM_M, records_of, thinned
 from airtruth.checks.kinematics_search import DOUBT, ROUNDS, ErrorSearch, completed, search
-from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
+from airtruth.checks.kinematics_side import CONTROLS, ERRORS, LATERAL, ONE_OF, SideRecord
 from airtruth.checks.result import CheckResult, Finding
 from airtruth.checks.rotation import given, rates
 from airtruth.checks.samples import integral
@@ -29,8 +30,6 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-LONGEST_ARM_SPANS: Final = 1.5
-"""Largest arm [spans]: judgement; the nose boom of a T-38 is 1.2 spans ahead of the CG."""
 USUAL_ARM_SPANS: Final = 0.4
 """Arm that is not unusual [spans]: judgement; the nose of a transport is that far ahead."""
 STEADY: Final = 0.1
@@ -47,7 +46,7 @@ ARMS: Final = (error_name(_BETA, "arm"), error_name(_AY, "arm"))
 def check_lateral(
     logs: Sequence[FlightLog],
     declared: Mapping[str, float] | None = None,
-    span_m: float | None = None,
+    length_m: float | None = None,
     biases: Mapping[str, float] | None = None,
 ) -> CheckResult:
     """Estimate the errors of the sensors of roll, yaw and sideslip from all runs together; the gate is not passed.
@@ -58,7 +57,8 @@ def check_lateral(
     ----------
     logs : flight logs; of many runs the first `MOST_RECORDS` in which aileron or rudder moves are taken.
     declared : instrument errors that are known, names of `airtruth.checks.kinematics_side.ERRORS` in SI.
-    span_m : wing span, which limits arms to `LONGEST_ARM_SPANS` [m]; None if it is not known.
+    length_m : reference length, which limits arms as in `airtruth.checks.kinematics.check_kinematics` [m]; None if it is not
+        known.
     biases : channel -> bias that is known [unit of the channel].
 
     Raises
@@ -71,8 +71,8 @@ def check_lateral(
     equations = tuple(
         e for e, c in LATERAL.channels.items() if records[0].channel(LATERAL.fields[c]) is not None
     )
-    usual = _candidates(equations, known, span_m)
-    limits = limits_of(records, LONGEST_ARM_M if span_m is None else LONGEST_ARM_SPANS * span_m, LATERAL)
+    usual = _candidates(equations, known, length_m)
+    limits = limits_of(records, LATERAL.longest_arm_m(length_m), LATERAL)
     problem = problem_of(records, equations, known, limits, kinematics=LATERAL)
     found, shown = _searched(problem, usual)
     findings = (*errors_of(found, usual), *_biases(found, biases or {}))
@@ -135,12 +135,12 @@ def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]
     shared = set.intersection(*(set(log.channels) for log in logs))
     missing = [n for n in _NEEDED if n not in shared]
     if missing or not shared & set(MOTION.surfaces) or not set(LATERAL.channels.values()) & shared:
-        wanted = missing or [f"{' or '.join(MOTION.surfaces)}, and beta_rad, phi_rad or psi_rad"]
+        wanted = missing or [f"{' or '.join(MOTION.surfaces)}, and {ONE_OF}"]
         raise LogError(
             f"the lateral motion cannot be assessed: {', '.join(wanted)} is missing; map it on import"
         )
     records, remarks = records_of(
-        logs, _record, "aileron and rudder, p or r do not", "a manoeuvre of roll and yaw"
+        logs, _record, f"{LATERAL.controls}, p or r do not", "a manoeuvre of roll and yaw"
     )
     absent = [n for n in _INPUTS if n not in shared]
     if absent:
@@ -169,10 +169,9 @@ def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord | No
     airspeed, p, r, ay = (c[n] for n in _NEEDED)
     _, q, _, _, theta = rates(c)
     alpha = given(c, LONGITUDINAL.vane)
-    aileron, rudder = (given(c, n) for n in MOTION.surfaces)
     forward, normal = "ax_m_s2", LONGITUDINAL.outputs[-1].channel
     path = given(c, forward) * np.cos(alpha) + given(c, normal) * np.sin(alpha)
-    phi, psi = (np.unwrap(c[n]) if n in c else None for n in ("phi_rad", "psi_rad"))
+    phi, psi = (np.unwrap(c[n]) if n in c else None for n in ATTITUDE[1:])
     record = thinned(
         SideRecord(
             run_id=run_id,
@@ -181,8 +180,7 @@ def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord | No
             p=p,
             r=r,
             ay=ay,
-            aileron=aileron,
-            rudder=rudder,
+            **dict(zip(CONTROLS, (given(c, n) for n in MOTION.surfaces), strict=True)),
             alpha=alpha,
             theta=theta if "theta_rad" in c else alpha,
             q=q,
@@ -197,11 +195,11 @@ def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord | No
 
 
 def _candidates(
-    equations: Sequence[str], known: Mapping[str, float], span_m: float | None
+    equations: Sequence[str], known: Mapping[str, float], length_m: float | None
 ) -> dict[str, float]:
     """Errors that the equations can show, with their usual sizes [SI]; of two arms the one that is not declared."""
     shown = {channel for equation in equations for channel in OF_EQUATION[equation]}
-    arm = USUAL_ARM_M if span_m is None else USUAL_ARM_SPANS * span_m
+    arm = USUAL_ARM_M if length_m is None else USUAL_ARM_SPANS * length_m
     result = {}
     for name, error in ERRORS.items():
         if error.channel not in shown or (name == ARMS[1] and name in known):

@@ -189,7 +189,9 @@ LONGITUDINAL: Final = Kinematics(
     | {y.channel: y.name for y in MOTION.outputs},
     compare=compare,
     motions=lambda record: pitch_motions(record.elevator, record.q, record.dt_s),
-    controls="the elevator",
+    controls=f"the {MOTION.controls[0].name}",
+    reference="chord",
+    longest=7.0,  # judgement; the nose boom of ATTAS is 4.1 chords ahead of the CG, a Boeing 747 is 8.5 chords long
     same=(
         frozenset({"vane_arm", "accelerometer_arm"}),
         frozenset({"accelerometer_scale", "airspeed_scale"}),

@@ -15,6 +15,7 @@ from airtruth.checks.pitch_motions import smoothing
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
+from airtruth.physics.motion_parts import Reference
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
 from airtruth.units import UNITS, printed
 
@@ -221,6 +222,8 @@ class Kinematics:
     compare : record, errors and equations -> difference of each equation, of the shape of the channels.
     motions : record -> (k, samples) motions that the control surfaces cause.
     controls : the control surfaces, in sentences.
+    reference : reference length of the motion.
+    longest : largest arm over that length [-].
     same : groups of errors that move the channels in the same way; no set has two of a group.
     telling : sizes that records have to show before the channels are called consistent [SI].
     most : largest number of errors in a set; a real record, which no kinematic model of few terms explains exactly, takes up any
@@ -237,6 +240,8 @@ class Kinematics:
     compare: Callable[[Any, Mapping[str, float], Sequence[str]], dict[str, Array]]
     motions: Callable[[Any], Array]
     controls: str
+    reference: Reference
+    longest: float
     same: tuple[frozenset[str], ...] = ()
     telling: Mapping[str, float] = field(default_factory=dict)
     most: int = 3
@@ -244,6 +249,10 @@ class Kinematics:
     offsets: Mapping[str, float] = field(default_factory=dict)
     common: bool = False
     moved_by: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    def longest_arm_m(self, length_m: float | None) -> float:
+        """Largest arm of an aircraft of a reference length [m]; `LONGEST_ARM_M` where it is not known."""
+        return LONGEST_ARM_M if length_m is None else self.longest * length_m
 
 
 def declared_errors(aircraft: Aircraft, kinematics: Kinematics) -> dict[str, float]:

@@ -108,6 +108,8 @@ ERRORS: Final[dict[str, InstrumentError]] = {error.name: error for error in _ALL
 """Errors that the kinematics can show, by name."""
 _ERROR: Final = {(e.channel, e.kind): (name, e.neutral) for name, e in ERRORS.items()}
 """Channel and kind -> name and value without error."""
+CONTROLS: Final = tuple(control.name for control in MOTION.controls)
+"""Controls, each a field of a record."""
 _GYRO: Final[tuple[Kind, ...]] = ("lag", "delay", "scale")
 """Kinds of errors of a gyroscope."""
 
@@ -218,7 +220,7 @@ def motions(record: SideRecord) -> Array:
     dt = record.dt_s
     beta = record.beta if record.beta is not None else record.bank
     states, surfaces = tuple(s.channel for s in MOTION.states), MOTION.surfaces
-    deflections = (record.aileron, record.rudder)
+    deflections = [getattr(record, name) for name in CONTROLS]
     values = (beta, record.p, record.r, record.bank, *deflections)
     every = {n: x[None] for n, x in zip((*states, *surfaces), values, strict=True)}
     a, b = fitted(every, dt, states, surfaces)
@@ -244,7 +246,9 @@ LATERAL: Final = Kinematics(
     | {y.channel: y.name for y in (*MOTION.outputs, *LONGITUDINAL.outputs) if not y.late or y.channel == _AY},
     compare=compare,
     motions=motions,
-    controls="aileron and rudder",
+    controls=" and ".join(CONTROLS),
+    reference="span",
+    longest=1.5,  # judgement; the nose boom of a T-38 is 1.2 spans ahead of the CG
     same=(frozenset({error_name(_BETA, "arm"), error_name(_AY, "arm")}),),
     telling={error_name(_BETA, "scale"): 0.15, error_name(_BETA, "lag"): 0.1},
     most=4,
@@ -259,4 +263,7 @@ LATERAL: Final = Kinematics(
 )
 """The kinematics of the lateral-directional motion (`telling`: judgement, as in the longitudinal motion)."""
 
-__all__ = ["ERRORS", "LATERAL", "SideRecord", "compare", "motions"]
+ONE_OF: Final = "{}, {} or {}".format(*sorted(LATERAL.channels.values()))
+"""Channels of which a record has to have one, in words."""
+
+__all__ = ["CONTROLS", "ERRORS", "LATERAL", "ONE_OF", "SideRecord", "compare", "motions"]

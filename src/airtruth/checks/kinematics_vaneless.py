@@ -7,15 +7,21 @@ from dataclasses import replace
 from typing import Final
 
 from airtruth.checks.result import CheckResult
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.reconstruction import NEEDED
 
+_SPEED, _RATE, _NORMAL = NEEDED
 COMPUTED: Final = (
-    "alpha_rad was computed from airspeed_m_s, q_rad_s, az_m_s2 and, where they are recorded, ax_m_s2, theta_rad and altitude_m: "
-    "it fits them by construction, which is no evidence, so errors of airspeed_m_s, az_m_s2 and ax_m_s2 are not assessed."
+    f"{LONGITUDINAL.vane} was computed from {', '.join(NEEDED)} and, where they are recorded, ax_m_s2, theta_rad and altitude_m: "
+    f"it fits them by construction, which is no evidence, so errors of {_SPEED}, {_NORMAL} and ax_m_s2 are not assessed."
 )
 """The first sentence of a check without a vane."""
-REMEDY: Final = "Compare the airspeed with ground speed on opposite headings and az_m_s2 with gravity at rest, or record a vane."
+REMEDY: Final = (
+    "Compare the airspeed with ground speed on opposite headings and "
+    f"{_NORMAL} with gravity at rest, or record a vane."
+)
 """Advice on finding the errors that remain."""
-WITHOUT_ATTITUDE: Final = f"Without theta_rad q_rad_s is not assessed either. {REMEDY}"
+WITHOUT_ATTITUDE: Final = f"Without theta_rad {_RATE} is not assessed either. {REMEDY}"
 """The second sentence of a check without a vane and without a pitch attitude."""
 
 
@@ -44,10 +50,10 @@ def without_vane(result: CheckResult) -> CheckResult:
     """Return the result of a comparison of theta and q alone: it says nothing of the other channels."""
     words, verdict = result.sentences, result.verdict
     if verdict == "agrees":
-        words = ("theta_rad follows the integral of q_rad_s; this alone was tested.", *words[1:])
+        words = (f"theta_rad follows the integral of {_RATE}; this alone was tested.", *words[1:])
         verdict = "cannot_tell"
     else:
-        words = ("theta_rad and q_rad_s were compared with each other.", *words)
+        words = (f"theta_rad and {_RATE} were compared with each other.", *words)
     return replace(result, verdict=verdict, sentences=(COMPUTED, *words, REMEDY))
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks import kinematics_lateral, kinematics_model, kinematics_side
+from airtruth.checks import kinematics_lateral, kinematics_model, kinematics_side, poor
 from airtruth.checks.excitation import moves, turns
 from airtruth.checks.gate import admit
 from airtruth.checks.kinematics import check_kinematics
@@ -16,7 +16,7 @@ from airtruth.checks.kinematics_record import declared_biases, declared_errors
 from airtruth.checks.kinematics_vaneless import untestable
 from airtruth.checks.result import CheckResult
 from airtruth.errors import LogError, choices
-from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.flight_log import FlightLog, batches
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 
 
@@ -42,8 +42,8 @@ def missing_channels(log: FlightLog, motion: Motion) -> tuple[str, ...]:
     missing = [n for n in motion.required if n not in log.channels]
     if not {"density_kg_m3", "altitude_m"} & set(log.channels):
         missing.append("density_kg_m3 or altitude_m")
-    if motion is LATERAL and not {"beta_rad", "phi_rad", "psi_rad"} & set(log.channels):
-        missing.append("beta_rad, phi_rad or psi_rad")
+    if motion is LATERAL and not set(kinematics_side.LATERAL.channels.values()) & set(log.channels):
+        missing.append(kinematics_side.ONE_OF)
     return tuple(missing)
 
 
@@ -117,10 +117,15 @@ def check_motions(
     parts = [one.log for one in admitted]
     remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
     forced = tuple(sentence for one in admitted for sentence in one.forced)
+    doubts = poor.words([one for log in parts for batch in batches(log) for one in poor.measured(batch)])
+    found = {one: _check(one, parts, aircraft) for one in chosen(parts, motion)}
     return {
-        one.name: replace(result, sentences=(*result.sentences, *remarks), forced=forced)
-        for one in chosen(parts, motion)
-        for result in (_check(one, parts, aircraft),)
+        one.name: replace(
+            result,
+            sentences=(*(doubts if one is LONGITUDINAL else ()), *result.sentences, *remarks),
+            forced=forced,
+        )
+        for one, result in found.items()
     }
 
 
@@ -148,8 +153,8 @@ def _untold(logs: Sequence[FlightLog], reason: str) -> CheckResult:
     """The result of records without roll and yaw: nothing is compared."""
     return untestable(
         (run_id for log in logs for run_id in log.run_ids),
-        f"These records cannot tell whether the channels of roll, yaw and sideslip agree: {reason}. Fly an aileron and a "
-        "rudder doublet.",
+        f"These records cannot tell whether the channels of roll, yaw and sideslip agree: {reason}. Fly doublets of "
+        f"{kinematics_side.LATERAL.controls}.",
     )
 
 

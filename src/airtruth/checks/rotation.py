@@ -20,11 +20,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import ATTITUDE
 from airtruth.checks.spectra import integral
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
+(_PITCH,), (_ROLL, _YAW) = LONGITUDINAL.gyros, LATERAL.gyros
+_, _BANK, _ = ATTITUDE
 
 
 def bank_coupling(q: Array, r: Array, phi: Array, theta: Array) -> Array:
@@ -64,22 +68,22 @@ def across_flow(az: Array, ax: Array | float, alpha: Array, theta: Array) -> Arr
 
 def given(c: Channels, name: str) -> Array:
     """A channel of a log with roll and yaw, or zero where the log has none."""
-    return c[name] if name in c else np.zeros_like(c["p_rad_s"])
+    return c[name] if name in c else np.zeros_like(c[_ROLL])
 
 
 def rates(c: Channels) -> tuple[Array, Array, Array, Array, Array]:
     """p, q, r, phi, theta of a log with roll and yaw; zero where the log has none."""
-    p, q, r, phi, theta = (given(c, n) for n in ("p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad"))
+    p, q, r, phi, theta = (given(c, n) for n in (_ROLL, _PITCH, _YAW, _BANK, "theta_rad"))
     return p, q, r, phi, theta
 
 
 def pitched(c: Channels, dt_s: float) -> Array:
     """Change of pitch attitude by the rates [rad]; wings level where no bank is known."""
-    q = c["q_rad_s"]
+    q = c[_PITCH]
     turned = integral(q, dt_s)
-    if "phi_rad" not in c or "r_rad_s" not in c:
+    if _BANK not in c or _YAW not in c:
         return turned
-    return turned + integral(pitch_coupling(q, c["r_rad_s"], c["phi_rad"]), dt_s)
+    return turned + integral(pitch_coupling(q, c[_YAW], c[_BANK]), dt_s)
 
 
 def banked(c: Channels, dt_s: float) -> Array:

@@ -11,7 +11,18 @@ import numpy as np
 from airtruth.channels import SIGNALS
 from airtruth.checks.means import LIMITS, MEANS
 from airtruth.checks.relation import Relation
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 
+TURNS: Final = dict(zip((control.name for control in LATERAL.controls), ("rolls", "yaws"), strict=True))
+"""Control -> what it does to an aircraft."""
+STEADY: Final = dict(
+    zip(
+        (f"{control.name}_size" for control in LATERAL.controls),
+        (("roll rate", " 1/s", "3 to 15"), ("sideslip", "", "0.4 to 1.6")),
+        strict=True,
+    )
+)
+"""Test of the size of a control -> steady motion that it causes, its unit and the usual range (judgement)."""
 SHOWN: Final = 3
 """Number of runs that a sentence names."""
 PASSED: Final = 4.0
@@ -42,12 +53,12 @@ def evidence(test: Relation, row: int = -1) -> str:
         return f"{name} averages {f[0]:.3g} m/s2, where gravity and the path require {f[1]:.3g} +- {f[2]:.2g} m/s2"
     if test.name == "theta":
         return (
-            f"theta_rad changes by {f[0]:.3g} +- {f[1]:.2g} of the integral of q_rad_s (squared correlation "
+            f"theta_rad changes by {f[0]:.3g} +- {f[1]:.2g} of the integral of {name} (squared correlation "
             f"{f[2]:.2f}), where 1 is required"
         )
     if test.name == "alpha":
         return (
-            f"alpha_rad changes by {f[0]:.3g} +- {f[2]:.2g} of the integral of q_rad_s and by {f[1]:.3g} +- {f[3]:.2g} "
+            f"{name} changes by {f[0]:.3g} +- {f[2]:.2g} of the integral of {test.channels[3]} and by {f[1]:.3g} +- {f[3]:.2g} "
             "of that of (az + g cos(gamma))/V, where 1 and 1 are required"
         )
     if test.name in ("phi", "psi"):
@@ -57,31 +68,28 @@ def evidence(test: Relation, row: int = -1) -> str:
             f"correlation {f[2]:.2f}), where 1 is required"
         )
     if test.name == "beta":
-        return f"the rate of beta_rad is {_shares(f)}, where 1 is required of each"
+        return f"the rate of {LATERAL.vane} is {_shares(f)}, where 1 is required of each"
     if test.name == "side_slope":
+        side = LATERAL.outputs[-1].channel
         return (
-            f"ay_m_s2 changes by {-f[0]:.2g} +- {f[1]:.2g} g per radian of beta_rad, where sideslip from the right pushes to the "
-            f"left, usually by about {f[2]:.2g} g"
+            f"{side} changes by {-f[0]:.2g} +- {f[1]:.2g} g per radian of {LATERAL.vane}, where sideslip from the right pushes "
+            f"to the left, usually by about {f[2]:.2g} g"
         )
-    if test.name in ("aileron", "rudder"):
-        side = "rolls" if test.name == "aileron" else "yaws"
+    if test.name in TURNS:
         return (
             f"with the other causes held, {name} changes the rate of {test.channels[1]} by {f[0]:+.3g} +- {f[1]:.2g} 1/s2, where "
-            f"a positive {test.name} {side} to the left"
+            f"a positive {test.name} {TURNS[test.name]} to the left"
         )
-    if test.name == "aileron_size":
-        return f"the steady roll rate is {f[0]:.3g} 1/s of {name}, where 3 to 15 1/s is usual"
-    if test.name == "rudder_size":
-        return f"the steady sideslip is {f[0]:.3g} of {name}, where 0.4 to 1.6 is usual"
-    if test.name == "elevator":
+    if test.name in STEADY:
+        quantity, unit, usual = STEADY[test.name]
+        return f"the steady {quantity} is {f[0]:.3g}{unit} of {name}, where {usual}{unit} is usual"
+    if test.name == LONGITUDINAL.controls[0].name:
         return (
-            f"with alpha and q held, elevator_rad changes q' by {f[0]:+.3g} +- {f[1]:.2g} 1/s2, where a trailing edge "
+            f"with alpha and q held, {name} changes q' by {f[0]:+.3g} +- {f[1]:.2g} 1/s2, where a trailing edge "
             "down (positive) pitches the nose down"
         )
     if test.name == "ax_slope":
-        return (
-            f"ax_m_s2 changes by {f[0]:.2g} +- {f[1]:.2g} g per radian of alpha_rad, where about 1 g is usual"
-        )
+        return f"ax_m_s2 changes by {f[0]:.2g} +- {f[1]:.2g} g per radian of {LONGITUDINAL.vane}, where about 1 g is usual"
     if test.name == "command":
         return (
             f"{test.channels[1]} follows {f[0]:.3g} +- {f[1]:.2g} of {name} after {1e3 * f[2]:+.0f} "

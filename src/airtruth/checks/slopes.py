@@ -22,6 +22,7 @@ Channels = Mapping[str, Array]
 
 VANE, GYRO, NORMAL = LONGITUDINAL.output_channels
 SURFACE = LONGITUDINAL.surfaces[0]
+LIFT_SLOPE, *_, CONTROL_POWER = LONGITUDINAL.parameters
 CAUSES: Final = (VANE, SURFACE, GYRO)
 """Channels of the motion in pitch."""
 AXIAL_SLOPE: Final = (1.0, 0.4)
@@ -45,7 +46,7 @@ A damaged aircraft that leaves its trim stalls, and no derivative describes it. 
 """
 RATIOS: Final = np.linspace(-6.0, 6.0, 121)
 """Logarithms of the ratio of a true derivative to the declared one that are compared with an estimate [-] (judgement)."""
-TYPICAL: Final = {"CLalpha": 4.5, "Cmde": -1.2}
+TYPICAL: Final = {LIFT_SLOPE: 4.5, CONTROL_POWER: -1.2}
 """Derivatives of conventional aircraft [1/rad], for those that declare none (shipped aircraft: 3 to 6, -0.5 to -2)."""
 
 
@@ -117,14 +118,14 @@ def _aerodynamic_tests(runs: Runs, aircraft: Aircraft) -> list[Relation]:
     result = []
     for name, factors, scale, tolerance, channels in (
         (
-            "CLalpha",
+            LIFT_SLOPE,
             lift,
             to_lift,
             LIFT_STD,
             ("airspeed_m_s", "density_kg_m3", VANE, NORMAL, SURFACE, GYRO),
         ),
         (
-            "Cmde",
+            CONTROL_POWER,
             control,
             to_moment,
             MOMENT_STD,
@@ -152,4 +153,4 @@ def _ratio_distance(ratio: Array, std: Array, tolerance: float) -> Array:
     return finite(np.min(apart, axis=0))
 
 
-__all__ = ["slopes_near_trim"]
+__all__ = ["CONTROL_POWER", "TYPICAL", "slopes_near_trim"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError
+from airtruth.identification.record_constants import LateralValues, RecordConstants
 from airtruth.physics import short_period
 from airtruth.physics.lateral import lateral_scale, lateral_system
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
@@ -30,40 +31,22 @@ class FlightPoint:
     Attributes
     ----------
     airspeed_m_s, density_kg_m3 : true airspeed [m/s], density of the air [kg/m3].
-    wing_area_m2, chord_m : reference area [m2] and mean aerodynamic chord [m].
-    mass_kg, inertia_yy_kg_m2 : mass [kg], pitch inertia [kg m2].
-    trim : further trim values by the names of channels, of those that are known [SI].
+    constants : of the aircraft, those that its motion needs.
+    trim : further trim values by the names of channels, of those that are known [SI]; for the lateral-directional motion the
+        angle of attack and the pitch attitude.
     """
 
     airspeed_m_s: float
     density_kg_m3: float
-    wing_area_m2: float
-    chord_m: float
-    mass_kg: float
-    inertia_yy_kg_m2: float
+    constants: RecordConstants
     trim: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, float]:
         """All values by name, with the dynamic pressure [Pa]."""
-        own = {name: float(getattr(self, name)) for name in self.__dataclass_fields__ if name != "trim"}
+        air = {"airspeed_m_s": self.airspeed_m_s, "density_kg_m3": self.density_kg_m3}
+        own = {name: float(value) for name, value in (air | asdict(self.constants)).items()}
         pressure = 0.5 * self.density_kg_m3 * self.airspeed_m_s**2
         return {**own, "dynamic_pressure_pa": pressure, **self.trim}
-
-
-@dataclass(frozen=True, kw_only=True)
-class LateralFlightPoint(FlightPoint):
-    """The same for the lateral-directional motion; its trim has alpha_rad and theta_rad.
-
-    Attributes
-    ----------
-    span_m : span [m].
-    inertia_xx_kg_m2, inertia_zz_kg_m2, inertia_xz_kg_m2 : roll and yaw inertia, integral of x z dm [kg m2].
-    """
-
-    span_m: float
-    inertia_xx_kg_m2: float
-    inertia_zz_kg_m2: float
-    inertia_xz_kg_m2: float
 
 
 Matrices = tuple[Array, Array, Array, Array]
@@ -72,9 +55,7 @@ Matrices = tuple[Array, Array, Array, Array]
 
 def _short_period(theta: Array, at: FlightPoint) -> Matrices:
     """M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2) and (3); az in m/s2."""
-    scale = short_period.scale(
-        at.wing_area_m2, at.chord_m, at.mass_kg, at.inertia_yy_kg_m2, at.airspeed_m_s, at.density_kg_m3
-    )
+    scale = short_period.scale_of(at.constants, at.airspeed_m_s, at.density_kg_m3)
     a, b = short_period.system(theta, scale)
     row = short_period.normal_force_row(theta, scale)
     return a, b[:, None], np.vstack([np.eye(2), row[:2]]), np.array([[0.0], [0.0], [row[2]]])
@@ -82,9 +63,10 @@ def _short_period(theta: Array, at: FlightPoint) -> Matrices:
 
 def _lateral(theta: Array, at: FlightPoint) -> Matrices:
     """V. Klein and E. A. Morelli, 3.2 and 3.3, see `airtruth.physics.lateral`; ay in m/s2."""
-    if not isinstance(at, LateralFlightPoint):
-        raise TypeError("the lateral motion needs a LateralPoint")
-    s = lateral_scale(at, at.airspeed_m_s, at.density_kg_m3, at.trim["alpha_rad"], at.trim["theta_rad"])
+    if not isinstance(at.constants, LateralValues):
+        raise TypeError("the lateral motion needs its constants")
+    angles = (at.trim[name] for name in (LONGITUDINAL.vane, "theta_rad"))
+    s = lateral_scale(at.constants, at.airspeed_m_s, at.density_kg_m3, *angles)
     return lateral_system(theta, s)
 
 
@@ -216,7 +198,7 @@ class LinearModel:
         at = self.point
         lines = [
             f"{self.motion.heading} as a linear model: {self.source}",
-            f"about {at.airspeed_m_s:.4g} m/s, {at.density_kg_m3:.4g} kg/m3, mass {at.mass_kg:.4g} kg",
+            f"about {at.airspeed_m_s:.4g} m/s, {at.density_kg_m3:.4g} kg/m3, mass {at.constants.mass_kg:.4g} kg",
             f"states {', '.join(self.states)}; inputs {', '.join(self.inputs)}; outputs {', '.join(self.outputs)}",
         ]
         for name, matrix in self.matrices.items():
@@ -247,4 +229,4 @@ def _plain(values: Array) -> Any:
     return [float(x) if np.isfinite(x) else None for x in values]
 
 
-__all__ = ["SYSTEMS", "FlightPoint", "LateralFlightPoint", "LinearModel"]
+__all__ = ["SYSTEMS", "FlightPoint", "LinearModel"]

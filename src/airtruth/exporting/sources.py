@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.exporting.model import FlightPoint, LateralFlightPoint, LinearModel
-from airtruth.identification.record_constants import LateralValues, RecordConstants
+from airtruth.exporting.model import FlightPoint, LinearModel
+from airtruth.identification.record_constants import LateralValues, RecordConstants, values_of
 from airtruth.logs.names import ESTIMATES
 from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.physics.atmosphere import density_kg_m3
@@ -30,14 +30,9 @@ _AIR: Final = ("airspeed_m_s", "density_kg_m3")
 """Columns of a file of estimates with airspeed and density."""
 _CONDITION: Final[Mapping[str, tuple[str, ...]]] = {
     LONGITUDINAL.name: _AIR,
-    LATERAL.name: (*_AIR, "alpha_rad", "theta_rad"),
+    LATERAL.name: (*_AIR, LONGITUDINAL.vane, "theta_rad"),
 }
 """Motion -> columns of a file of estimates with the flight condition."""
-_CONSTANTS: Final[Mapping[str, tuple[str, ...]]] = {
-    LONGITUDINAL.name: tuple(f.name for f in fields(RecordConstants)),
-    LATERAL.name: tuple(f.name for f in fields(LateralValues)),
-}
-"""Motion -> constants of the aircraft."""
 
 
 def estimates_file(source: Path) -> Path | None:
@@ -122,8 +117,9 @@ def _of_estimates(file: Path, method: str | None, run_id: str | None) -> LinearM
     constants, runs = records[chosen]["constants"], own["run_id"].tolist()
     at = {name: float(own[name].mean()) for name in condition}
     trim = {name: at.pop(name) for name in condition if name not in _AIR}
-    known = at | {name: float(constants[name]) for name in _CONSTANTS[motion.name]}
-    point = LateralFlightPoint(**known, trim=trim) if motion is LATERAL else FlightPoint(**known, trim=trim)
+    kind = LateralValues if motion is LATERAL else RecordConstants
+    known = kind(**{f.name: float(constants[f.name]) for f in fields(kind)})
+    point = FlightPoint(**at, constants=known, trim=trim)
     of = f"run {runs[0]}" if len(runs) == 1 else f"mean of {len(runs)} converged runs"
     return LinearModel(
         motion=motion,
@@ -188,17 +184,13 @@ def _of_aircraft(aircraft: Aircraft, airspeed_m_s: float, altitude_m: float) -> 
     if aircraft.file.jsbsim is not None:
         at = trim_of(aircraft, airspeed_m_s, density, altitude_m, 0.0)
     derivatives = declared_derivatives(aircraft, at)
-    constants = aircraft.constants
-    trim = {} if at is None else {"alpha_rad": at.alpha_rad, "elevator_rad": at.elevator_rad}
-    point = FlightPoint(
-        airspeed_m_s=airspeed_m_s,
-        density_kg_m3=density,
-        wing_area_m2=constants.wing_area_m2,
-        chord_m=constants.chord_m,
-        mass_kg=constants.mass_kg if at is None else at.mass_kg,
-        inertia_yy_kg_m2=constants.inertia_yy_kg_m2,
-        trim={**trim, "altitude_m": altitude_m},
-    )
+    constants = values_of(aircraft.constants)
+    trim = {}
+    if at is not None:
+        constants = replace(constants, mass_kg=at.mass_kg)
+        signals = zip(LONGITUDINAL.signals, at.origin(LONGITUDINAL).tolist(), strict=True)
+        trim = {signal.channel: value for signal, value in signals if signal.length is None}
+    point = FlightPoint(airspeed_m_s, density, constants, {**trim, "altitude_m": altitude_m})
     source = (
         "derivatives of aircraft.toml"
         if at is None

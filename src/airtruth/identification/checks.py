@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import ATTITUDE
 from airtruth.checks.sentences import left_out
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.identification.methods import METHODS, Method
@@ -54,7 +55,7 @@ def check_channels(log: FlightLog, methods: Sequence[Method], motion: Motion = L
                 f"the {motion.name} motion needs the channel {name}, which the log lacks; map it on import, or use --motion "
                 f"{LONGITUDINAL.name if motion is LATERAL else LATERAL.name}"
             )
-    if motion is LATERAL and not {"beta_rad", "phi_rad", "psi_rad"} & set(log.channels):
+    if motion is LATERAL and not {LATERAL.vane, *ATTITUDE[1:]} & set(log.channels):
         raise LogError(
             "the lateral motion needs beta_rad, or phi_rad or psi_rad to reconstruct it, and the log has none of them; map one "
             "on import"

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from airtruth.logs.flight_log import Batch
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import Scale, scale
+from airtruth.physics.short_period import PitchConstants, Scale, scale_of
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -44,26 +44,8 @@ NO_LEFT: Final = np.empty((0, 4, 0))
 """Left sides at constant pressure without lateral motion: the estimators form them from the signals."""
 
 
-class AircraftConstants(Protocol):
-    """Constants of the aircraft that an identification needs."""
-
-    @property
-    def wing_area_m2(self) -> float:
-        """Reference area S [m2]."""
-
-    @property
-    def chord_m(self) -> float:
-        """Mean aerodynamic chord c [m]."""
-
-    @property
-    def mass_kg(self) -> float:
-        """Mass m [kg]."""
-
-    @property
-    def inertia_yy_kg_m2(self) -> float:
-        """Pitch inertia Iyy [kg m2]."""
-
-
+AircraftConstants = PitchConstants
+"""Constants of the aircraft that an identification needs."""
 OneOrEach = AircraftConstants | Sequence[AircraftConstants]
 """Constants of all batches, or one entry for each of them: fuel burn changes mass and inertia between records."""
 
@@ -129,14 +111,7 @@ def flight_condition(
         mean_density = density[:, :last].mean(axis=1)
     if options.airspeed_m_s is not None:
         mean_airspeed = np.full_like(mean_airspeed, options.airspeed_m_s)
-    return scale(
-        constants.wing_area_m2,
-        constants.chord_m,
-        constants.mass_kg,
-        constants.inertia_yy_kg_m2,
-        mean_airspeed,
-        mean_density,
-    )
+    return scale_of(constants, mean_airspeed, mean_density)
 
 
 def window_samples(options: Options, dt_s: float) -> int:

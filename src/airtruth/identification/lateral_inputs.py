@@ -45,16 +45,16 @@ def lateral_inputs(batch: Batch, constants: object) -> tuple[Array, Array]:
     if not ({_P, _R, LATERAL.vane} <= set(c) and ixx > 0.0 and izz > 0.0):
         return nothing
     p, r = c[_P], c[_R]
-    moment = ((izz - ixx) * p * r - ixz * (p**2 - r**2)) / iyy
-    lift = -(p * np.cos(alpha) + r * np.sin(alpha)) * np.tan(c[LATERAL.vane])
-    caused = cumulative_trapezoid(moment, dx=batch.dt_s, axis=1, initial=0.0)
+    q_rate_rad_s2 = ((izz - ixx) * p * r - ixz * (p**2 - r**2)) / iyy
+    alpha_rate_rad_s = -(p * np.cos(alpha) + r * np.sin(alpha)) * np.tan(c[LATERAL.vane])
+    caused = cumulative_trapezoid(q_rate_rad_s2, dx=batch.dt_s, axis=1, initial=0.0)
     # a constant moment is a trim: its integral is a trend
     time = np.linspace(-1.0, 1.0, q.shape[1])
     time /= np.linalg.norm(time)
     caused -= caused.mean(axis=1, keepdims=True)
     caused -= (caused @ time)[:, None] * time
     counts = (caused.std(axis=1) > _LEAST * q.std(axis=1))[:, None]
-    return np.where(counts, lift, 0.0), np.where(counts, moment, 0.0)
+    return np.where(counts, alpha_rate_rad_s, 0.0), np.where(counts, q_rate_rad_s2, 0.0)
 
 
 def stated_value(constants: object, name: str) -> float:

@@ -32,7 +32,7 @@ from airtruth.logs.histories import Histories, History
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
-from airtruth.physics.short_period import Scale, normal_force_row, scale, system
+from airtruth.physics.short_period import Scale, normal_force_row, scale_of, system
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -207,7 +207,7 @@ def _predicted(theta: Array, own: RecordConstants, batch: Batch, measured: Array
         return simulate_lateral(theta, batch, own)
     channels = {name: values[0] for name, values in batch.channels.items()}
     airspeed, density = float(channels["airspeed_m_s"].mean()), float(air_density(channels).mean())
-    s = scale(own.wing_area_m2, own.chord_m, own.mass_kg, own.inertia_yy_kg_m2, airspeed, density)
+    s = scale_of(own, airspeed, density)
     (control,) = LONGITUDINAL.surfaces
     return simulate(theta, s, batch.dt_s, channels[control], measured)
 

@@ -22,26 +22,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from typing import Final
 
 from airtruth.errors import ConfigurationError
+from airtruth.physics.expected import EXPECTED
+from airtruth.physics.motion import LONGITUDINAL
 
 EQUATIONS: Final[Mapping[str, str]] = {
-    "CLalpha": "eq. (3)",
-    "CLq": "eq. (5)",
-    "CLde": "eq. (7)",
-    "Cmalpha": "eq. (4)",
-    "Cmq": "eq. (6)",
-    "Cmde": "eq. (7)",
+    name: f"eq. ({number})" for name, number in zip(LONGITUDINAL.parameters, (3, 5, 7, 4, 6, 7), strict=True)
 }
 """Derivative -> its equation in `airtruth.physics.handbook`."""
 RELATIVE_SCATTER: Final[Mapping[str, float]] = {
-    "CLalpha": 0.13,
-    "CLq": 1.1,
-    "CLde": 0.34,
-    "Cmq": 0.8,
-    "Cmde": 0.44,
+    name: scatter
+    for name, scatter in zip(LONGITUDINAL.parameters, (0.13, 1.1, 0.34, None, 0.8, 0.44), strict=True)
+    if scatter is not None
 }
 """Standard deviation of a proposed derivative over its value [-]: the relative error that 68 % of eight JSBSim models do not
 exceed (measured, `python -m studies.geometry_scatter`)."""
@@ -82,7 +77,7 @@ class Planform:
         ConfigurationError
             If a length or area is not above 0, or the elevator is larger than its tail.
         """
-        for name in ("span_m", "wing_area_m2", "chord_m", "tail_span_m", "tail_area_m2", "tail_arm_m"):
+        for name in (f.name for f in fields(self) if f.default is MISSING):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise ConfigurationError(f"geometry: {name} has to be above 0 (is {value:g})")
@@ -138,14 +133,10 @@ def derivatives(planform: Planform) -> dict[str, float]:
     arm = p.tail_arm_m / p.chord_m
     area = p.efficiency * tail * p.tail_area_m2 / p.wing_area_m2  # a_t eta S_t/S
     tau = flap_effectiveness(p.elevator_share)
-    return {
-        "CLalpha": wing + area * (1.0 - downwash),
-        "CLq": 2.0 * area * arm * (1.0 + downwash),
-        "CLde": area * tau,
-        "Cmalpha": wing * (p.cg - 0.25) - area * arm * (1.0 - downwash),
-        "Cmq": -2.0 * area * arm**2 * (1.1 + downwash),
-        "Cmde": -area * arm * tau,
-    }
+    lift = (wing + area * (1.0 - downwash), 2.0 * area * arm * (1.0 + downwash), area * tau)
+    stiffness = wing * (p.cg - 0.25) - area * arm * (1.0 - downwash)
+    moment = (stiffness, -2.0 * area * arm**2 * (1.1 + downwash), -area * arm * tau)
+    return dict(zip(LONGITUDINAL.parameters, (*lift, *moment), strict=True))
 
 
 def standard_deviations(planform: Planform) -> dict[str, float]:
@@ -160,7 +151,7 @@ def standard_deviations(planform: Planform) -> dict[str, float]:
     """
     values = derivatives(planform)
     stds = {name: RELATIVE_SCATTER.get(name, 0.0) * abs(value) for name, value in values.items()}
-    return stds | {"Cmalpha": MARGIN_SCATTER * values["CLalpha"]}
+    return stds | {EXPECTED[LONGITUDINAL.name].stiffness: MARGIN_SCATTER * values[LONGITUDINAL.parameters[0]]}
 
 
 __all__ = [

@@ -158,6 +158,16 @@ class Mode:
     description: str
 
 
+def reference_length_m(constants: object, length: Reference | None) -> float:
+    """Reference length of a moment or a rate of an aircraft [m]; 1 for a force or an angle, which have none.
+
+    Parameters
+    ----------
+    constants : of the aircraft, with one attribute for each reference length.
+    """
+    return 1.0 if length is None else float(getattr(constants, f"{length}_m"))
+
+
 __all__ = [
     "Coefficient",
     "Control",
@@ -168,4 +178,5 @@ __all__ = [
     "Reference",
     "Signal",
     "State",
+    "reference_length_m",
 ]

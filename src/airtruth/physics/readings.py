@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion_parts import reference_length_m
 from airtruth.physics.terms import QBAR, ReadingTerm, StateTerm, shape_of
 
 Array = NDArray[np.float64]
@@ -48,9 +49,8 @@ def reading_increments(
     terms: Sequence[ReadingTerm],
     states: Sequence[StateTerm],
     truth: Mapping[str, Array],
-    chord_m: float,
+    constants: object,
     dt_s: float,
-    span_m: float = 0.0,
 ) -> dict[str, Array]:
     """Increments of readings by channel; a channel without terms is left out.
 
@@ -59,7 +59,7 @@ def reading_increments(
     terms, states : of the sensors; states that no term names do not matter.
     truth : airspeed_m_s and the channels of the signals that the terms name, (runs, samples) each, at the CG [SI]; with
         density_kg_m3 or altitude_m where a term names the dynamic pressure.
-    chord_m, span_m : reference lengths [m]; qhat = q c/(2V), phat = p b/(2V).
+    constants : of the aircraft, with the reference lengths l of the rates, x l/(2V).
     dt_s : sample period [s].
 
     Returns
@@ -70,12 +70,11 @@ def reading_increments(
         return {}
     named = {name for term in terms for name in (term.signal, term.behind)}
     named |= {state.signal for state in states if state.name in named}
-    lengths = {"chord": chord_m, "span": span_m}
     signals = {}
     for signal in (s for m in MOTIONS.values() for s in (*m.signals, *m.known_signals) if s.name in named):
         x = truth[signal.channel]
         if signal.length is not None:
-            x = x * (0.5 * lengths[signal.length]) / truth["airspeed_m_s"]
+            x = x * (0.5 * reference_length_m(constants, signal.length)) / truth["airspeed_m_s"]
         signals[signal.name] = x
     if QBAR in named:
         signals[QBAR] = 0.5 * np.asarray(air_density(truth)) * truth["airspeed_m_s"] ** 2

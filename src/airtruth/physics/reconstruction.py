@@ -19,12 +19,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
-NEEDED: Final = ("airspeed_m_s", "q_rad_s", "az_m_s2")
+NEEDED: Final = ("airspeed_m_s", *LONGITUDINAL.gyros, LONGITUDINAL.outputs[-1].channel)
 """Channels that the reconstruction needs."""
+_, _RATE, _NORMAL = NEEDED
 ERRORS: Final = ("path", "az", "q", "airspeed")
 """Unknowns: start of gamma [rad], errors of az [m/s2], of q [rad/s], and relative error of V [-]."""
 COLUMNS: Final = tuple(f"alpha_error_{i}_rad" for i in range(1, len(ERRORS) + 1))
@@ -52,8 +54,8 @@ def is_reconstructed(channels: Collection[str]) -> bool:
 class ReconstructionPriors:
     """Standard deviations of constant errors: az [m/s2], q [rad/s], relative error of V [-]."""
 
-    az_m_s2: float
-    q_rad_s: float
+    acceleration_m_s2: float
+    rate_rad_s: float
     airspeed: float
 
 
@@ -87,7 +89,7 @@ def reconstruct(channels: Mapping[str, Array], dt_s: float, priors: Reconstructi
     priors : assumed standard deviations of the errors of the instruments.
     """
     level = PATH_STD_RAD["altitude_m" in channels]
-    scale = np.array([level, priors.az_m_s2, priors.q_rad_s, priors.airspeed])
+    scale = np.array([level, priors.acceleration_m_s2, priors.rate_rad_s, priors.airspeed])
     p = np.zeros(len(ERRORS))
     covariance = np.diag(scale**2)
     for _ in range(3):
@@ -109,8 +111,8 @@ def reconstruct(channels: Mapping[str, Array], dt_s: float, priors: Reconstructi
 def _motion(c: Mapping[str, Array], dt_s: float, p: Array) -> tuple[Array, dict[str, Array]]:
     """Alpha, and altitude and attitude as measured would be, for the unknowns p; constants of both are those measured."""
     speed = c["airspeed_m_s"] * (1.0 + p[3])
-    az, ax = c["az_m_s2"] + p[1], c.get("ax_m_s2")
-    turned = _integral(c["q_rad_s"] + p[2], dt_s)
+    az, ax = c[_NORMAL] + p[1], c.get("ax_m_s2")
+    turned = _integral(c[_RATE] + p[2], dt_s)
     turned = turned - turned.mean()
     mean = c["theta_rad"].mean() if "theta_rad" in c else UNKNOWN_ALPHA_RAD + p[0] - turned[0]
     theta = mean + turned

@@ -11,11 +11,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.sensor_errors import SensorErrors
 
 Array = NDArray[np.float64]
 
-_ACCELEROMETERS: Final = ("ax_m_s2", "ay_m_s2", "az_m_s2")
+ACCELEROMETERS: Final = ("ax_m_s2", LATERAL.outputs[-1].channel, LONGITUDINAL.outputs[-1].channel)
 """Channels of specific force along x, y, z."""
 
 
@@ -115,17 +116,12 @@ def hold(x: Array, dt_s: float, hold_s: float) -> Array:
     return np.take(x, taken, axis=-1)
 
 
-def vane_alpha(alpha_rad: ArrayLike, q_rad_s: ArrayLike, x_m: float, airspeed_m_s: ArrayLike) -> Array:
+def vane_equation(alpha_rad: Array, q_rad_s: Array, x_m: float, airspeed_m_s: Array) -> Array:
     """Angle of attack at a vane x forward of the centre of gravity, alpha - q x/V [rad].
 
-    The vane moves up with q x (nose up), which lowers the flow angle there; to first order in q x/V.
+    The vane moves up with q x (nose up), which lowers the flow angle there; to first order in q x/V. It is arithmetic alone,
+    which the tracer's filter compiles for single numbers.
     """
-    alpha, q, v = (np.asarray(x, dtype=np.float64) for x in (alpha_rad, q_rad_s, airspeed_m_s))
-    return vane_equation(alpha, q, x_m, v)
-
-
-def vane_equation(alpha_rad: Array, q_rad_s: Array, x_m: float, airspeed_m_s: Array) -> Array:
-    """`vane_alpha` as arithmetic alone, which the tracer's filter compiles for single numbers."""
     return alpha_rad - q_rad_s * x_m / airspeed_m_s
 
 
@@ -153,26 +149,13 @@ def accelerometer_az(
     return np.asarray(az_m_s2, dtype=np.float64) - q_dot * x_m - np.square(q) * z_m
 
 
-def vane_beta(
-    beta_rad: ArrayLike,
-    p_rad_s: ArrayLike,
-    r_rad_s: ArrayLike,
-    x_m: float,
-    z_m: float,
-    airspeed_m_s: ArrayLike,
-) -> Array:
-    """Sideslip at a vane (x, z) from the centre of gravity, beta + x r/V - z p/V [rad], to first order in the rates.
-
-    The vane moves to the right with r x - p z, the y component of omega x r.
-    """
-    beta, p, r, v = (np.asarray(x, dtype=np.float64) for x in (beta_rad, p_rad_s, r_rad_s, airspeed_m_s))
-    return side_vane_equation(beta, p, r, x_m, z_m, v)
-
-
 def side_vane_equation(
     beta_rad: Array, p_rad_s: Array, r_rad_s: Array, x_m: float, z_m: float, airspeed_m_s: Array
 ) -> Array:
-    """`vane_beta` as arithmetic alone, which the tracer's filter compiles for single numbers."""
+    """Sideslip at a vane (x, z) from the centre of gravity, beta + x r/V - z p/V [rad], to first order in the rates.
+
+    The vane moves to the right with r x - p z, the y component of omega x r. It is arithmetic alone, as `vane_equation`.
+    """
     return beta_rad + (x_m * r_rad_s - z_m * p_rad_s) / airspeed_m_s
 
 
@@ -219,28 +202,30 @@ def at_instrument(channel: str, truth: Mapping[str, Array], errors: SensorErrors
     """
     x, y, z = arm = errors.x_m, errors.y_m, errors.z_m
     if channel == "airspeed_m_s" and errors.alpha_slope_per_rad != 0.0:
-        return truth[channel] * errors.slope(truth["alpha_rad"])
+        return truth[channel] * errors.slope(truth[LONGITUDINAL.vane])
     if arm == (0.0, 0.0, 0.0):
         return truth[channel]
-    rolls = "p_rad_s" in truth
-    if channel == "alpha_rad":
-        alpha = vane_alpha(truth["alpha_rad"], truth["q_rad_s"], x, truth["airspeed_m_s"])
-        return alpha + truth["p_rad_s"] * y / truth["airspeed_m_s"] if rolls and y != 0.0 else alpha
-    if channel == "beta_rad":
-        beta, p, r = (truth[name] for name in ("beta_rad", "p_rad_s", "r_rad_s"))
-        return vane_beta(beta, p, r, x, z, truth["airspeed_m_s"])
-    if channel in _ACCELEROMETERS and rolls:
-        rates, changes = ([truth[f"{axis}_{unit}"] for axis in "pqr"] for unit in ("rad_s", "dot_rad_s2"))
-        moved: Array = rotation_acceleration(rates, changes, arm)[_ACCELEROMETERS.index(channel)]
+    (pitching,), (rolling, yawing) = LONGITUDINAL.gyros, LATERAL.gyros
+    rolls = rolling in truth
+    if channel == LONGITUDINAL.vane:
+        alpha = vane_equation(truth[channel], truth[pitching], x, truth["airspeed_m_s"])
+        return alpha + truth[rolling] * y / truth["airspeed_m_s"] if rolls and y != 0.0 else alpha
+    if channel == LATERAL.vane:
+        rates = truth[rolling], truth[yawing]
+        return side_vane_equation(truth[channel], *rates, x, z, truth["airspeed_m_s"])
+    if channel in ACCELEROMETERS and rolls:
+        turning, changes = ([truth[f"{axis}_{unit}"] for axis in "pqr"] for unit in ("rad_s", "dot_rad_s2"))
+        moved: Array = rotation_acceleration(turning, changes, arm)[ACCELEROMETERS.index(channel)]
         return truth[channel] + moved
-    if channel == "az_m_s2":
-        return accelerometer_az(truth["az_m_s2"], truth["q_dot_rad_s2"], x, truth["q_rad_s"], z)
-    if channel == "ax_m_s2":
-        return accelerometer_ax(truth["ax_m_s2"], truth["q_rad_s"], truth["q_dot_rad_s2"], x, z)
+    if channel == ACCELEROMETERS[2]:
+        return accelerometer_az(truth[channel], truth["q_dot_rad_s2"], x, truth[pitching], z)
+    if channel == ACCELEROMETERS[0]:
+        return accelerometer_ax(truth[channel], truth[pitching], truth["q_dot_rad_s2"], x, z)
     return truth[channel]
 
 
 __all__ = [
+    "ACCELEROMETERS",
     "accelerometer_ax",
     "accelerometer_az",
     "at_instrument",
@@ -250,7 +235,5 @@ __all__ = [
     "measure",
     "rotation_acceleration",
     "side_vane_equation",
-    "vane_alpha",
-    "vane_beta",
     "vane_equation",
 ]

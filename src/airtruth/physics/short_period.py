@@ -7,6 +7,7 @@ Deviations from trim; derivatives per radian, rate derivatives per q c/(2V).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,26 @@ Array = NDArray[np.float64]
 
 CL_ALPHA, CL_Q, CL_DE, CM_ALPHA, CM_Q, CM_DE = range(len(LONGITUDINAL.parameters))
 """Positions in ``LONGITUDINAL.parameters``."""
+
+
+class PitchConstants(Protocol):
+    """Constants of the aircraft that the short period needs."""
+
+    @property
+    def wing_area_m2(self) -> float:
+        """Reference area S [m2]."""
+
+    @property
+    def chord_m(self) -> float:
+        """Mean aerodynamic chord c [m]."""
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass m [kg]."""
+
+    @property
+    def inertia_yy_kg_m2(self) -> float:
+        """Pitch inertia Iyy [kg m2]."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +85,12 @@ def scale(
         normal=force / mass_kg,
         half_chord_time=chord_m / (2.0 * v),
     )
+
+
+def scale_of(constants: PitchConstants, airspeed_m_s: Array | float, density_kg_m3: Array | float) -> Scale:
+    """`scale` of an aircraft at an airspeed [m/s] and a density [kg/m3]."""
+    c = constants
+    return scale(c.wing_area_m2, c.chord_m, c.mass_kg, c.inertia_yy_kg_m2, airspeed_m_s, density_kg_m3)
 
 
 def system(theta: Array, s: Scale) -> tuple[Array, Array]:
@@ -137,10 +164,12 @@ __all__ = [
     "CM_ALPHA",
     "CM_DE",
     "CM_Q",
+    "PitchConstants",
     "Scale",
     "derivatives",
     "modal",
     "normal_force_row",
     "scale",
+    "scale_of",
     "system",
 ]

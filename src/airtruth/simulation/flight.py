@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -16,15 +16,20 @@ from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, FlightError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.terms import ELEVATOR
-from airtruth.simulation.attitude import straight_attitude
 from airtruth.simulation.lateral_feedback import FED, LateralFeedback, Loop
 from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
-from airtruth.simulation.simulator import Executive
+from airtruth.simulation.simulator import BANK, Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
 Array = NDArray[np.float64]
 
+_ROTATION: Final = dict(
+    zip((*LONGITUDINAL.gyros, *LATERAL.gyros), ("rotary_gust", "roll_gust", "yaw_gust"), strict=True)
+)
+"""Channel of an angular rate -> entry of the [jsbsim] table with the property of the rotation of the air."""
+_ERRORS: Final = {LONGITUDINAL.gyros[0]: "q_error", "theta_rad": "theta_error"}
+"""Channel -> entry of the augmentation with the property of the error of its sensor."""
 _SELDOM: Final = 0.1
 """Share of the steps at which a property changes up to which it is written at those alone [-] (judgement: it costs no bits)."""
 
@@ -38,14 +43,13 @@ class LateralInputs:
     commands_rad : control -> command, deviation from trim [rad]; aileron (right - left)/2, trailing edges down positive,
         rudder trailing edge left positive. A control without an entry keeps its trim.
     gust_v_m_s : velocity of the air to the right of the flight direction [m/s], or None.
-    gust_p_rad_s, gust_r_rad_s : rotation of the air about body x and z [rad/s], or None.
+    rotation_rad_s : channel of an angular rate -> rotation of the air about that axis [rad/s].
     feedback : yaw damper and bank hold, or None.
     """
 
     commands_rad: Mapping[str, Array]
     gust_v_m_s: Array | None = None
-    gust_p_rad_s: Array | None = None
-    gust_r_rad_s: Array | None = None
+    rotation_rad_s: Mapping[str, Array] = field(default_factory=dict)
     feedback: LateralFeedback | None = None
 
 
@@ -57,8 +61,8 @@ class Inputs:
     ----------
     command_rad : elevator command, deviation from trim [rad].
     gust_u_m_s, gust_w_m_s : velocity of the air along the flight direction and downward [m/s].
-    gust_q_rad_s : rotation of the air, nose-up positive, -dw/dx [rad/s], or None.
-    q_error_rad_s, theta_error_rad : sensor errors fed into the augmentation, or None.
+    rotation_rad_s : channel of the pitch rate -> rotation of the air, nose-up positive, -dw/dx [rad/s].
+    errors : channel -> sensor error fed into the augmentation [rad/s], [rad].
     damper_gain_s, attitude_gain : gains of the augmentation [s], [-].
     surface : the commands drive the surfaces themselves, past the actuators.
     lateral : lateral inputs of a run in six axes; None for fixed lateral controls in air without lateral gusts.
@@ -67,9 +71,8 @@ class Inputs:
     command_rad: Array
     gust_u_m_s: Array
     gust_w_m_s: Array
-    gust_q_rad_s: Array | None = None
-    q_error_rad_s: Array | None = None
-    theta_error_rad: Array | None = None
+    rotation_rad_s: Mapping[str, Array] = field(default_factory=dict)
+    errors: Mapping[str, Array] = field(default_factory=dict)
     damper_gain_s: float = 0.0
     attitude_gain: float = 0.0
     surface: bool = False
@@ -96,11 +99,10 @@ class Flight:
 
     def _start(self) -> None:
         executive, trim = self._executive, self.trim
-        executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+        executive.initialise(trim.condition, trim.controls)
         model = executive.model
         self._elevator = model.elevator
         self._augmentation = model.augmentation
-        self._rotary = model.rotary_gust
         self._lateral: dict[str, SurfaceProperties] = {}
         read = [*READ, model.elevator.surface]
         if trim.condition.six_axes:
@@ -159,9 +161,7 @@ class Flight:
         at, gamma = self.trim, self.trim.condition.gamma_rad
         if not at.condition.six_axes:
             return at.alpha_rad + gamma
-        return straight_attitude(
-            at.alpha_rad, at.controls.sideslip_rad, at.controls.bank_rad, gamma
-        ).theta_rad
+        return at.controls.attitude(gamma).theta_rad
 
     def _simulate(self, inputs: Inputs) -> Array:
         renewed = self._executive.renewed() if self._flown else self._executive
@@ -216,7 +216,7 @@ class Flight:
             return None
         motion = self._executive.nodes([SIGNALS[name].jsbsim for name in FED])
         reads = [node.get_double_value for node in motion]
-        return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.bank_rad, reads)
+        return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.of(BANK), reads)
 
     def _inputs(
         self, inputs: Inputs, loop: Loop | None
@@ -229,16 +229,10 @@ class Flight:
             ("atmosphere/gust-north-fps", inputs.gust_u_m_s / FT),
             ("atmosphere/gust-down-fps", inputs.gust_w_m_s / FT),
         ]
-        if inputs.gust_q_rad_s is not None:
-            if self._rotary is None:
-                raise ConfigurationError(
-                    "the aircraft has no property for a rotary gust (jsbsim.rotary_gust)"
-                )
-            pairs.append((self._rotary, inputs.gust_q_rad_s))
-        if self._augmentation is not None and inputs.q_error_rad_s is not None:
-            pairs.append((self._augmentation.q_error, inputs.q_error_rad_s))
-        if self._augmentation is not None and inputs.theta_error_rad is not None:
-            pairs.append((self._augmentation.theta_error, inputs.theta_error_rad))
+        pairs += self._rotating(inputs.rotation_rad_s)
+        if self._augmentation is not None:
+            fed_in = {name: getattr(self._augmentation, key) for name, key in _ERRORS.items()}
+            pairs += [(fed_in[name], values) for name, values in inputs.errors.items()]
         first = len(pairs)
         if self._lateral:
             pairs += self._lateral_inputs(inputs)
@@ -254,19 +248,22 @@ class Flight:
         """Properties and values of the lateral inputs, the commands of aileron and rudder first."""
         commands = zip(self._lateral.values(), self._lateral_commands(inputs), strict=True)
         pairs = [(surface.command, _in_time(surface, values, inputs)) for surface, values in commands]
-        lateral, model = inputs.lateral, self._executive.model
+        lateral = inputs.lateral
         if lateral is None:
             return pairs
         if lateral.gust_v_m_s is not None:
             pairs.append(("atmosphere/gust-east-fps", lateral.gust_v_m_s / FT))
-        for name, key, values in (
-            (model.roll_gust, "roll_gust", lateral.gust_p_rad_s),
-            (model.yaw_gust, "yaw_gust", lateral.gust_r_rad_s),
-        ):
-            if values is None:
-                continue
+        return pairs + self._rotating(lateral.rotation_rad_s)
+
+    def _rotating(self, rotation_rad_s: Mapping[str, Array]) -> list[tuple[str, Array]]:
+        """Properties and values of rotations of the air."""
+        pairs = []
+        for channel, values in rotation_rad_s.items():
+            name = getattr(self._executive.model, _ROTATION[channel])
             if name is None:
-                raise ConfigurationError(f"the aircraft has no property for a rotary gust (jsbsim.{key})")
+                raise ConfigurationError(
+                    f"the aircraft has no property for a rotary gust (jsbsim.{_ROTATION[channel]})"
+                )
             pairs.append((name, values))
         return pairs
 

@@ -153,15 +153,15 @@ def _bypassed(
     """Copy a model with its fly-by-wire bypassed; return a note."""
     found = JsbsimModel.model_validate({**facts["jsbsim"], "root": root})
     read = files.read(folder, found)
-    elevator = found.elevator
-    held = [name for name in facts["integrating"] if name != elevator.surface]
-    bypass(read.root, elevator.command, elevator.surface, _STICK_RAD / elevator.surface_rad, held)
+    (surface,) = found.surfaces(LONGITUDINAL).values()
+    held = [name for name in facts["integrating"] if name != surface.surface]
+    bypass(read.root, surface.command, surface.surface, _STICK_RAD / surface.surface_rad, held)
     files.copy(read, beside)
     files.write(read, beside / f"{model}.xml")
     also = f"; {', '.join(held)} held at 0" if held else ""
     return (
-        f"augmentation: the fly-by-wire integrates and no property switches it off; {elevator.command} drives "
-        f"{elevator.surface} in a copy of the model{also}"
+        f"augmentation: the fly-by-wire integrates and no property switches it off; {surface.command} drives "
+        f"{surface.surface} in a copy of the model{also}"
     )
 
 
@@ -179,7 +179,7 @@ def _written(
         name=out.name,
         description=f"{model} of JSBSim",
         jsbsim=table,
-        sensors=_sensors(table.aileron is not None),
+        sensors=_sensors(bool(table.surfaces(MOTION))),
     )
     heading = f"{model} of JSBSim, surveyed by airtruth; {REPORT} has the report. Author and licence: the JSBSim file."
     with new_folder(out) as made:
@@ -252,17 +252,17 @@ def _survey(folder: Path, model: str, root: str) -> Mapping[str, Any]:
 
 def _table(found: Mapping[str, Any], name: str, model: str, root: Literal[".", "wheel"]) -> JsbsimModel:
     """The [jsbsim] table with the entries that differ from their defaults."""
-    elevator = _stated(ElevatorProperties, found["elevator"])
     entries: dict[str, Any] = {
         "model": name if root == "." else model,
         "root": root,
-        "elevator": ElevatorProperties(**{"surface": found["elevator"]["surface"], **elevator}),
         "throttle": ThrottleProperties(command=tuple(found["throttle"]["command"])),
     }
     entries |= {key: found[key] for key in ("set", "declare", "engine_start_s") if found[key]}
-    for name in ("aileron", "rudder"):
-        if found[name] is not None:
-            entries[name] = SurfaceProperties(**_stated(SurfaceProperties, found[name]))
+    for control in (*LONGITUDINAL.controls, *MOTION.controls):
+        own = found[control.name]
+        if own is not None:
+            kind = ElevatorProperties if control in LONGITUDINAL.controls else SurfaceProperties
+            entries[control.name] = kind(**{"surface": own["surface"], **_stated(kind, own)})
     if found["lateral"] is not None:
         entries["lateral"] = LateralProperties(**found["lateral"])
     return JsbsimModel(**entries)

@@ -39,7 +39,7 @@ def commands_for(executive: Executive, at: Trim, control: str, surface: Array) -
     reached = []
     for command in commands:
         controls = at.controls.moved({control: float(command)})
-        executive.initialise(at.condition, at.alpha_rad, controls, engines_s=0.0)
+        executive.initialise(at.condition, controls, engines_s=0.0)
         reached.append(executive.respond().surfaces_rad[control])
     rising = np.maximum.accumulate(reached)
     kept = np.append(True, np.diff(rising) > _SAME_RAD)

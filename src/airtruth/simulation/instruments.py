@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.aircraft.probe import Constants
 from airtruth.channels import LATERAL, PITCH_PLANE
 from airtruth.physics import sensors
 from airtruth.physics.motion import LATERAL as MOTION
@@ -31,17 +32,16 @@ class Readings:
     Attributes
     ----------
     terms, states : increments of the readings, and the states that drive them.
-    lengths_m : reference chord and span [m].
+    constants : geometry of the aircraft.
     """
 
     terms: tuple[ReadingTerm, ...] = ()
     states: tuple[StateTerm, ...] = ()
-    lengths_m: tuple[float, float] = (1.0, 0.0)
+    constants: Constants | None = None
 
     def increments(self, truth: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
         """Channel -> increment of its reading, see `airtruth.physics.readings.reading_increments`."""
-        along, across = self.lengths_m
-        return reading_increments(self.terms, self.states, truth, along, dt_s, across)
+        return reading_increments(self.terms, self.states, truth, self.constants, dt_s)
 
 
 def readings_of(aircraft: Aircraft) -> Readings:
@@ -49,8 +49,7 @@ def readings_of(aircraft: Aircraft) -> Readings:
     dynamics = aircraft.file.dynamics
     if dynamics is None or not dynamics.readings:
         return Readings()
-    lengths_m = (aircraft.chord_m, aircraft.constants.span_m)
-    return Readings(dynamics.readings, dynamics.states, lengths_m)
+    return Readings(dynamics.readings, dynamics.states, aircraft.constants)
 
 
 def needs_every_step(

@@ -15,8 +15,8 @@ from airtruth.errors import TrimError
 from airtruth.physics import short_period
 from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_scale
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
-from airtruth.simulation.attitude import straight_attitude
-from airtruth.simulation.simulator import Executive
+from airtruth.simulation.probe_lateral import FORCES
+from airtruth.simulation.simulator import BANK, Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG, FT, PSF
 
@@ -34,10 +34,13 @@ STEPS: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
 pitch plane inside a cell of tables stated in degrees, and far above rounding; tables of a symmetric
 aircraft break at zero, a tenth of a degree beside its trim, and central differences over the break are the mean of its sides,
 which a flight sees."""
+_TRUTH: Final = {
+    LONGITUDINAL.name: (("plus", "minus", "central"), (LONGITUDINAL.vane, *LONGITUDINAL.surfaces)),
+    LATERAL.name: (("central", "plus", "minus"), (*LATERAL.surfaces, BANK, LATERAL.vane)),
+}
+"""Motion -> sides of its differences in truth.parquet, the true ones first, and channels of its trim there."""
 _LEAST_MOTION: Final = 1e-6
 """Least determinant of the motion of the surfaces with their commands [-]: a surface that stands still is refused."""
-_FORCES: Final = ("forces/fby-total-lbs", "moments/l-total-lbsft", "moments/n-total-lbsft")
-"""Side force [lbf], rolling and yawing moment about the CG [lbf ft], without gravity."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +99,10 @@ def _answer(executive: Executive, trim: Trim, motion: Motion, change: Mapping[st
     off = {signal.channel: change.get(signal.name, 0.0) for signal in motion.signals}
     at = trim.controls
     commands = {c.name: at.command(c.name) + off.pop(c.channel) for c in motion.controls}
-    alpha = trim.alpha_rad + off.pop(LONGITUDINAL.vane, 0.0)
-    sideslip = at.sideslip_rad + off.pop(LATERAL.vane, 0.0)
-    executive.initialise(trim.condition, alpha, at.moved(commands, sideslip_rad=sideslip), off)
-    answered = _coefficients(executive, trim) if motion is LATERAL else _accelerations(executive, trim, alpha)
+    at = at.moved(commands, **{channel: at.of(channel) + more for channel, more in off.items()})
+    executive.initialise(trim.condition, at)
+    flow = at.of(LONGITUDINAL.vane)
+    answered = _coefficients(executive, trim) if motion is LATERAL else _accelerations(executive, trim, flow)
     response = executive.respond()
     return np.array([*answered, *(response.surfaces_rad[c.name] for c in motion.controls)])
 
@@ -113,7 +116,7 @@ def _accelerations(executive: Executive, trim: Trim, alpha: float) -> tuple[floa
 def _coefficients(executive: Executive, trim: Trim) -> tuple[float, ...]:
     """CY, Cl and Cn in the present state [-]."""
     c = executive.aircraft.constants
-    force, roll, yaw = (executive.fdm[name] for name in _FORCES)
+    force, roll, yaw = (executive.fdm[name] for name in FORCES)
     area = 0.5 * trim.density_kg_m3 * trim.airspeed_m_s**2 / PSF * c.wing_area_m2 / FT**2  # q_bar S [lbf]
     span = c.span_m / FT
     return force / area, roll / (area * span), yaw / (area * span)
@@ -143,10 +146,8 @@ def _one_sided(
 
 
 def _in_pitch(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) -> Linearisation:
-    c = aircraft.constants
-    s = short_period.scale(
-        c.wing_area_m2, c.chord_m, trim.mass_kg, c.inertia_yy_kg_m2, trim.airspeed_m_s, trim.density_kg_m3
-    )
+    c = aircraft.constants.model_copy(update={"mass_kg": trim.mass_kg})
+    s = short_period.scale_of(c, trim.airspeed_m_s, trim.density_kg_m3)
     plus, minus = (short_period.derivatives(a, b[:, 0], s) for a, b in sides)
     modes = map(float, short_period.modal(plus, s))
     named = dict(zip(LONGITUDINAL.modal, modes, strict=True))
@@ -154,14 +155,13 @@ def _in_pitch(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) 
 
 
 def _in_six_axes(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]]) -> Linearisation:
-    c, at = aircraft.constants, trim.controls
-    attitude = straight_attitude(trim.alpha_rad, at.sideslip_rad, at.bank_rad, trim.condition.gamma_rad)
+    c = aircraft.constants
     s = lateral_scale(
         c.model_copy(update={"mass_kg": trim.mass_kg}),
         trim.airspeed_m_s,
         trim.density_kg_m3,
         trim.alpha_rad,
-        attitude.theta_rad,
+        trim.controls.attitude(trim.condition.gamma_rad).theta_rad,
     )
     rates = np.array([1.0, *2 * [2.0 * trim.airspeed_m_s / c.span_m]])
     plus, minus = (np.hstack([a * rates, b]).ravel() for a, b in sides)
@@ -170,28 +170,22 @@ def _in_six_axes(aircraft: Aircraft, trim: Trim, sides: list[tuple[Array, Array]
     return Linearisation(plus, minus, central, s, modes)
 
 
-def lateral_truth(linear: Linearisation | None, trim: Trim | None) -> dict[str, float]:
-    """Columns of truth.parquet of a run in six axes.
-
-    The derivatives are central differences, with those of each side beside them; then modes and the lateral trim.
+def truth_of(motion: Motion, linear: Linearisation | None, trim: Trim | None) -> dict[str, float]:
+    """Columns of truth.parquet of a motion: its derivatives with those of the other sides beside them, modes, and trim.
 
     Parameters
     ----------
     linear, trim : of the run's condition; None for a run that failed, whose columns are NaN.
     """
-    names = LATERAL.parameters
-    missing = np.full(len(names), np.nan)
+    missing = np.full(len(motion.parameters), np.nan)
     result: dict[str, float] = {}
-    for suffix, side in (("", "central"), ("_plus", "plus"), ("_minus", "minus")):
+    sides, at_trim = _TRUTH[motion.name]
+    for side in sides:
+        suffix = "" if side == sides[0] else f"_{side}"
         values = missing if linear is None else getattr(linear, side)
-        result |= {name + suffix: float(v) for name, v in zip(names, values, strict=True)}
-    result |= {name: np.nan if linear is None else linear.modes[name] for name in LATERAL.modal}
-    at = None if trim is None else trim.controls
-    return result | {
-        **{f"trim_{c.channel}": trim.surfaces_rad[c.name] if trim else np.nan for c in LATERAL.controls},
-        "trim_phi_rad": at.bank_rad if at else np.nan,
-        "trim_beta_rad": at.sideslip_rad if at else np.nan,
-    }
+        result |= {name + suffix: float(v) for name, v in zip(motion.parameters, values, strict=True)}
+    result |= {name: np.nan if linear is None else linear.modes[name] for name in motion.modal}
+    return result | {f"trim_{channel}": np.nan if trim is None else trim.of(channel) for channel in at_trim}
 
 
-__all__ = ["STEPS", "Linearisation", "lateral_truth", "linearise"]
+__all__ = ["STEPS", "Linearisation", "linearise", "truth_of"]

@@ -19,7 +19,7 @@ from airtruth.logs.validate import validate
 from airtruth.physics import atmosphere
 from airtruth.physics.late_surface import shift_of_a_delay
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import scale
+from airtruth.physics.short_period import scale_of
 from airtruth.quantity import Quantity
 from airtruth.simulation.linearise import Linearisation
 from airtruth.simulation.resolution import trimmed_and_linear
@@ -150,10 +150,7 @@ def allowing_for_delay(
     ConfigurationError
         If the estimates have no stable short period.
     """
-    c = load(aircraft).constants
-    factors = scale(
-        c.wing_area_m2, c.chord_m, c.mass_kg, c.inertia_yy_kg_m2, at.airspeed_m_s, at.density_kg_m3
-    )
+    factors = scale_of(load(aircraft).constants, at.airspeed_m_s, at.density_kg_m3)
     theta = np.array([estimates[name].value for name in LONGITUDINAL.parameters])
     shifts = dict(
         zip(LONGITUDINAL.parameters, shift_of_a_delay(theta, factors, delay_s).tolist(), strict=True)

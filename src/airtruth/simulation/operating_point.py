@@ -18,7 +18,7 @@ from airtruth.simulation.probe import (
     probe,
     with_breaks,
 )
-from airtruth.simulation.probe_lateral import LateralForceGrid, LateralTables, probe_lateral
+from airtruth.simulation.probe_lateral import LateralTables, probe_lateral
 from airtruth.simulation.trim import Trim
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def operating_point(aircraft: Aircraft, trim: Trim, grid: ForceGrid, ratios: Arr
     return OperatingPoint(
         tables=tables,
         at_speeds=forces_at_speeds(aircraft, trim, ratios),
-        over_alpha=forces_over_alpha(aircraft, trim, tables.alpha_rad, ratios),
+        over_alpha=forces_over_alpha(aircraft, trim, tables.axes[0], ratios),
         derivatives=linearise(aircraft, trim),
     )
 
@@ -76,7 +76,7 @@ class LateralOperatingPoint:
     derivatives: Linearisation
 
 
-def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: LateralForceGrid) -> LateralOperatingPoint:
+def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: ForceGrid) -> LateralOperatingPoint:
     """Probe the lateral forces of an aircraft about a trim in six axes.
 
     Parameters

@@ -14,12 +14,16 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import ELEVATOR
-from airtruth.simulation.simulator import AT_REST, Condition, Controls, Executive, SimulatorResponse
+from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG, G0, LBF
 
 Array = NDArray[np.float64]
 
+AXES: Final = (LONGITUDINAL.vane, *LONGITUDINAL.surfaces, *LONGITUDINAL.gyros)
+"""Channels of the axes of the tables."""
+FORCES: Final = ("forces/fbx-total-lbs", "forces/fbz-total-lbs", "accelerations/qdot-rad_sec2")
+"""Properties behind the values of the tables."""
 _FILTERS_S: Final = 0.25
 """Time for the filters of a model in each state, where engines have to run [s] (judgement: several lags of a servo)."""
 _POWER_S: Final = 10.0
@@ -51,14 +55,11 @@ class ForceGrid:
 
     Attributes
     ----------
-    alpha_rad, command_rad : angle of attack and elevator command (points,) [rad].
-    q_rad_s : pitch rate (points,) [rad/s].
+    axes : (points,) of each of `AXES`, the command in place of the surface [rad], [rad/s].
     airspeed : true airspeed over that of the trim (points,) [-].
     """
 
-    alpha_rad: Array
-    command_rad: Array
-    q_rad_s: Array
+    axes: tuple[Array, ...]
     airspeed: Array
 
 
@@ -68,37 +69,41 @@ class ForceTables:
 
     Attributes
     ----------
-    airspeed_m_s, alpha_rad, elevator_rad, q_rad_s : axes (nv,) [m/s], (na,) [rad], (ne,) [rad], (nq,)
-        [rad/s]; at least two points each.
-    values : (nv, na, ne, nq, 3) forces X, Z along body x, z [N], moment M about the CG [N m].
+    airspeed_m_s : (nv,) [m/s].
+    axes : (points,) of each of `AXES` [rad], [rad/s]; at least two points each.
+    values : (nv, points of each axis, 3) forces X, Z along body x, z [N], moment M about the CG [N m].
     """
 
     airspeed_m_s: Array
-    alpha_rad: Array
-    elevator_rad: Array
-    q_rad_s: Array
+    axes: tuple[Array, ...]
     values: Array
 
 
 def grid_about(
-    trim: Trim, alpha_rad: float = 10.0 * DEG, command_rad: float = 6.0 * DEG, q_rad_s: float = 60.0 * DEG
+    trim: Trim, reach: tuple[float, float, float] = (10.0 * DEG, 6.0 * DEG, 60.0 * DEG)
 ) -> ForceGrid:
-    """Return whole degrees of alpha and elevator near the trim, and pitch rates 12 deg/s apart.
+    """Return whole degrees of angle of attack and command near the trim, and pitch rates 12 deg/s apart.
 
-    Whole degrees put points on the breaks of tables that are stated in degrees; q has one at zero.
+    Whole degrees put points on the breaks of tables that are stated in degrees; the rate has one at zero.
     Airspeed has 95, 100 and 105 % of the trim's.
+
+    Parameters
+    ----------
+    reach : of each axis to both sides of the trim [rad], [rad/s].
     """
 
     def whole(centre: float, reach: float, step: float) -> Array:
         first, last = np.ceil((centre - reach) / step), np.floor((centre + reach) / step)
         return np.arange(first, last + 1.0) * step
 
-    return ForceGrid(
-        alpha_rad=whole(trim.alpha_rad, alpha_rad, DEG),
-        command_rad=whole(trim.controls.command(ELEVATOR), command_rad, DEG),
-        q_rad_s=whole(0.0, q_rad_s, 12.0 * DEG),
-        airspeed=np.array([0.95, 1.0, 1.05]),
-    )
+    axes = zip(_centres(trim), reach, (DEG, DEG, 12.0 * DEG), strict=True)
+    return ForceGrid(tuple(whole(*axis) for axis in axes), np.array([0.95, 1.0, 1.05]))
+
+
+def _centres(trim: Trim) -> tuple[float, ...]:
+    """Values of a trim on the axes of its tables, the command in place of the surface."""
+    commanded = {c.channel: trim.controls.command(c.name) for c in LONGITUDINAL.controls}
+    return tuple(commanded.get(channel, trim.controls.of(channel)) for channel in AXES)
 
 
 def probe(
@@ -121,27 +126,22 @@ def probe(
     """
     grid = grid or grid_about(trim)
     executive = Executive(aircraft, dt_s)
-    axes = (
-        _with(grid.airspeed, 1.0) * trim.airspeed_m_s,
-        _with(grid.alpha_rad, trim.alpha_rad),
-        _with(grid.command_rad, trim.controls.command(ELEVATOR)),
-        _with(grid.q_rad_s, 0.0),
-    )
-    forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
-    inertia = aircraft.constants.inertia_yy_kg_m2
-    states, (rate,) = HeldStates(executive, trim), LONGITUDINAL.gyros
-    values = np.empty((*(axis.size for axis in axes), 3))
+    own = [with_point(axis, centre) for axis, centre in zip(grid.axes, _centres(trim), strict=True)]
+    axes = [with_point(grid.airspeed, 1.0) * trim.airspeed_m_s, *own]
+    states, (control,) = HeldStates(executive, trim), LONGITUDINAL.controls
+    values = np.empty((*(axis.size for axis in axes), len(FORCES)))
     surface = np.empty(values.shape[:-1])
     # commands innermost: they cost the least
     for i, j, n, k in product(*(range(axes[a].size) for a in (0, 1, 3, 2))):
         at = (i, j, k, n)
-        v, alpha, command, q = (float(axis[m]) for axis, m in zip(axes, at, strict=True))
+        v, *state = (float(axis[m]) for axis, m in zip(axes, at, strict=True))
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * v / trim.airspeed_m_s)
-        controls = trim.controls.moved({ELEVATOR: command})
-        answer = states.respond(condition, alpha, controls, {rate: q})
-        surface[at] = answer.surfaces_rad[ELEVATOR]
-        values[at] = [*(node.get_double_value() * LBF for node in forces), answer.q_dot_rad_s2 * inertia]
-    return ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values)
+        motion = dict(zip(AXES, state, strict=True))
+        controls = trim.controls.moved({control.name: motion.pop(control.channel)}, **motion)
+        answer = states.respond(condition, controls)
+        surface[at] = answer.surfaces_rad[control.name]
+        values[at] = _forces(executive, answer)
+    return ForceTables(axes[0], (own[0], _surface(aircraft, surface), own[2]), values)
 
 
 def with_breaks(aircraft: Aircraft, trim: Trim, grid: ForceGrid, dt_s: float = 1.0 / 200.0) -> ForceGrid:
@@ -157,14 +157,15 @@ def with_breaks(aircraft: Aircraft, trim: Trim, grid: ForceGrid, dt_s: float = 1
     dt_s : simulation step of the executive [s].
     """
     executive = Executive(aircraft, dt_s)
-    force = executive.node("forces/fbz-total-lbs")
+    force = executive.node(FORCES[1])
     states = HeldStates(executive, trim)
 
-    def at(alpha: float) -> Array:
-        answer = states.respond(trim.condition, alpha, trim.controls)
+    def at(value: float) -> Array:
+        answer = states.respond(trim.condition, trim.controls.moved({}, **{AXES[0]: value}))
         return np.array([force.get_double_value(), answer.q_dot_rad_s2])
 
-    return replace(grid, alpha_rad=with_breaks_of(at, grid.alpha_rad))
+    first, *others = grid.axes
+    return replace(grid, axes=(with_breaks_of(at, first), *others))
 
 
 def with_breaks_of(function: Callable[[float], Array], points: Array) -> Array:
@@ -221,17 +222,14 @@ def forces_at_speeds(aircraft: Aircraft, trim: Trim, ratios: Array, dt_s: float 
     (points, 4) X, Z [N] and M [N m] of the aircraft, and X without that of the air [N].
     """
     executive = Executive(aircraft, dt_s)
-    inertia = aircraft.constants.inertia_yy_kg_m2
     rows = []
     for ratio in ratios:
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * float(ratio))
         executive = executive.again()
-        total = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
         air = executive.node("forces/fbx-aero-lbs")
-        executive.initialise(condition, trim.alpha_rad, trim.controls)
-        moment = executive.respond().q_dot_rad_s2 * inertia
-        x, z = (node.get_double_value() * LBF for node in total)
-        rows.append([x, z, moment, x - air.get_double_value() * LBF])
+        executive.initialise(condition, trim.controls)
+        total = _forces(executive, executive.respond())
+        rows.append([*total, total[0] - air.get_double_value() * LBF])
     return np.array(rows)
 
 
@@ -277,15 +275,19 @@ def forces_over_alpha(
     (points, alpha, 3) X, Z [N] and M [N m] of the aircraft.
     """
     executive = Executive(aircraft, dt_s)
-    forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
     states = HeldStates(executive, trim)
-    values = np.empty((ratios.size, alpha_rad.size, 3))
+    values = np.empty((ratios.size, alpha_rad.size, len(FORCES)))
     for i, j in np.ndindex(values.shape[:2]):
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * float(ratios[i]))
-        answer = states.respond(condition, float(alpha_rad[j]), trim.controls)
-        moment = answer.q_dot_rad_s2 * aircraft.constants.inertia_yy_kg_m2
-        values[i, j] = [*(node.get_double_value() * LBF for node in forces), moment]
+        controls = trim.controls.moved({}, **{AXES[0]: float(alpha_rad[j])})
+        values[i, j] = _forces(executive, states.respond(condition, controls))
     return values
+
+
+def _forces(executive: Executive, answer: SimulatorResponse) -> list[float]:
+    """X, Z [N] and M [N m] about the CG in the present state."""
+    x, z = (node.get_double_value() * LBF for node in executive.nodes(FORCES[:2]))
+    return [x, z, answer.q_dot_rad_s2 * executive.aircraft.constants.inertia_yy_kg_m2]
 
 
 class HeldStates:
@@ -302,46 +304,50 @@ class HeldStates:
         self.holds = executive.model.elevator.feedback
         self.loses_power = False
         if executive.model.engine_start_s > 0.0:
-            executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+            executive.initialise(trim.condition, trim.controls)
             steady = executive.respond()
-            executive.initialise(trim.condition, trim.alpha_rad, trim.controls, engines_s=_FILTERS_S)
+            executive.initialise(trim.condition, trim.controls, engines_s=_FILTERS_S)
             self.loses_power = executive.respond().differs(steady) > _SAME_RESPONSE
         self.motion: tuple[object, ...] | None = None
 
-    def respond(
-        self,
-        condition: Condition,
-        alpha_rad: float,
-        controls: Controls,
-        rates_rad_s: Mapping[str, float] = AT_REST,
-    ) -> SimulatorResponse:
+    def respond(self, condition: Condition, controls: Controls) -> SimulatorResponse:
         """Response in a state of the grid."""
         if not self.holds:
-            return self._settled(condition, alpha_rad, controls, rates_rad_s)
-        command = controls.command(ELEVATOR)
-        wanted = self.trim.elevator_rad + command - self.trim.controls.command(ELEVATOR)
-        for _ in range(_HOLDS):
-            answer = self._settled(condition, alpha_rad, controls.moved({ELEVATOR: command}), rates_rad_s)
-            error = wanted - answer.surfaces_rad[ELEVATOR]
-            if abs(error) < _SAME_SURFACE_RAD:
-                break
-            command += error
-        return answer
+            return self._settled(condition, controls)
+        at, name = self.trim, ELEVATOR
+        wanted = {name: at.surfaces_rad[name] + controls.command(name) - at.controls.command(name)}
+        return with_surfaces(lambda moved: self._settled(condition, moved), controls, wanted)
 
-    def _settled(
-        self, condition: Condition, alpha_rad: float, controls: Controls, rates_rad_s: Mapping[str, float]
-    ) -> SimulatorResponse:
-        motion = (condition, alpha_rad, controls.sideslip_rad, controls.bank_rad, rates_rad_s)
+    def _settled(self, condition: Condition, controls: Controls) -> SimulatorResponse:
+        motion = (condition, controls.motion)
         if self.loses_power and motion == self.motion:
             self.executive.change_controls(controls, _FILTERS_S)
         else:
             settling_s = _POWER_S if self.loses_power else _FILTERS_S
-            self.executive.initialise(condition, alpha_rad, controls, rates_rad_s, settling_s)
+            self.executive.initialise(condition, controls, settling_s)
         self.motion = motion
         return self.executive.respond()
 
 
-def _with(axis: Array, value: float) -> Array:
+def with_surfaces(
+    respond: Callable[[Controls], SimulatorResponse], controls: Controls, wanted: Mapping[str, float]
+) -> SimulatorResponse:
+    """Response with surfaces where they are wanted, or at the end of their range, whatever augmentation adds.
+
+    Parameters
+    ----------
+    respond : response to controls; controls : where the search begins; wanted : control -> surface [rad].
+    """
+    for _ in range(_HOLDS):
+        answer = respond(controls)
+        errors = {name: angle - answer.surfaces_rad[name] for name, angle in wanted.items()}
+        if all(abs(error) < _SAME_SURFACE_RAD for error in errors.values()):
+            break
+        controls = controls.moved({name: controls.command(name) + e for name, e in errors.items()})
+    return answer
+
+
+def with_point(axis: Array, value: float) -> Array:
     """The axis and one value more, unless a point is there already."""
     kept = axis[np.abs(axis - value) > 1e-9 * (1.0 + abs(value))]
     return np.sort(np.append(kept, value))

@@ -64,19 +64,17 @@ def linear_point(
         return point_of(aircraft, *trimmed_and_linear(aircraft, condition, dt_s))
     straight = condition if condition.six_axes else replace(condition, straight="wings-level")
     at, linear = trimmed_and_linear(aircraft, straight, dt_s, LATERAL)
-    trimmed = {
-        LATERAL.flow: at.controls.sideslip_rad,
-        **{c.name: at.surfaces_rad[c.name] for c in LATERAL.controls},
-        **{s.name: getattr(at, s.channel) for s in LATERAL.known_signals},
-    }
-    return LinearPoint(linear.central, trimmed, tail_geometry(aircraft), LATERAL)
+    return point_of(aircraft, at, linear, LATERAL)
 
 
-def point_of(aircraft: Aircraft, at: Trim, linear: Linearisation) -> LinearPoint:
-    """Derivatives, trim and tail of an aircraft that was trimmed and linearised."""
-    flow, (control,) = LONGITUDINAL.flow, LONGITUDINAL.controls
-    trimmed = {flow: at.alpha_rad, control.name: at.elevator_rad}
-    return LinearPoint(linear.central, trimmed, tail_geometry(aircraft))
+def point_of(
+    aircraft: Aircraft, at: Trim, linear: Linearisation, motion: Motion = LONGITUDINAL
+) -> LinearPoint:
+    """Derivatives, trim and tail of an aircraft that was trimmed and linearised for a motion."""
+    origin = zip(motion.signals, at.origin(motion).tolist(), strict=True)
+    trimmed = {s.name: value for s, value in origin if s.length is None}
+    trimmed |= {s.name: at.controls.of(s.channel) for s in motion.known_signals}
+    return LinearPoint(linear.central, trimmed, tail_geometry(aircraft), motion)
 
 
 def at_condition(

@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final, Literal
 
 import jsbsim
@@ -20,7 +19,7 @@ from airtruth.aircraft.model import SurfaceProperties
 from airtruth.aircraft.probe import load_model, model_root
 from airtruth.errors import AircraftError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
-from airtruth.simulation.attitude import straight_attitude
+from airtruth.simulation.attitude import Attitude, straight_attitude
 from airtruth.simulation.quiet import no_files
 from airtruth.units import FT, KT, SLUG
 
@@ -49,8 +48,8 @@ _RATES: Final = dict(
     )
 )
 """Channel of an angular rate -> its initial condition."""
-AT_REST: Final[Mapping[str, float]] = MappingProxyType({})
-"""No angular rate."""
+(BANK,) = (output.channel for output in LATERAL.outputs if output.instrument == "attitude")
+"""Channel of the bank."""
 STOPS: Final = (jsbsim.BaseError, RuntimeError, KeyError)
 """Exceptions that JSBSim raises on a model or a property."""
 _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
@@ -86,29 +85,38 @@ class Condition:
 
 @dataclass(frozen=True)
 class Controls:
-    """Commands, and the attitude to the air in which they hold the aircraft.
+    """Commands, and the motion in which they hold the aircraft.
 
     Attributes
     ----------
     throttle : lever, 0 to 1 [-].
     commands_rad : control -> command [rad]; a control without an entry is at 0.
     held : lateral control -> command that holds an asymmetric aircraft straight in a longitudinal flight, -1 to 1 [-].
-    bank_rad, sideslip_rad : attitude [rad].
+    motion : channel of a flow angle, of the bank or of an angular rate -> its value [rad], [rad/s]; one without an entry is 0.
     """
 
     throttle: float
     commands_rad: Mapping[str, float] = field(default_factory=dict)
     held: Mapping[str, float] = field(default_factory=dict)
-    bank_rad: float = 0.0
-    sideslip_rad: float = 0.0
+    motion: Mapping[str, float] = field(default_factory=dict)
 
     def command(self, control: str) -> float:
         """Command of a control [rad]."""
         return self.commands_rad.get(control, 0.0)
 
-    def moved(self, commands_rad: Mapping[str, float], **attitude_rad: Any) -> Controls:
-        """The controls with other commands, and with another bank_rad or sideslip_rad."""
-        return replace(self, commands_rad={**self.commands_rad, **commands_rad}, **attitude_rad)
+    def of(self, channel: str) -> float:
+        """Value of a channel of the motion [rad], [rad/s]."""
+        return self.motion.get(channel, 0.0)
+
+    def moved(self, commands_rad: Mapping[str, float], **motion: float) -> Controls:
+        """The controls with other commands, and in another motion."""
+        return replace(
+            self, commands_rad={**self.commands_rad, **commands_rad}, motion={**self.motion, **motion}
+        )
+
+    def attitude(self, gamma_rad: float) -> Attitude:
+        """Attitude of the straight flight along a path [rad]."""
+        return straight_attitude(self.of(LONGITUDINAL.vane), self.of(LATERAL.vane), self.of(BANK), gamma_rad)
 
 
 @dataclass(frozen=True)
@@ -214,9 +222,7 @@ class Executive:
     def initialise(
         self,
         condition: Condition,
-        alpha_rad: float,
         controls: Controls,
-        rates_rad_s: Mapping[str, float] = AT_REST,
         engines_s: float | None = None,
     ) -> None:
         """Put the aircraft into a state at time zero, with lags, filters and engines settled.
@@ -224,12 +230,10 @@ class Executive:
         Parameters
         ----------
         condition : airspeed, altitude and flight path.
-        alpha_rad : angle of attack [rad].
-        controls : commands, throttle, bank and sideslip.
-        rates_rad_s : channel of an angular rate -> its value [rad/s]; 0 for one without an entry.
+        controls : commands, throttle and motion.
         engines_s : longest time for which engines and filters run, instead of that of the model [s].
         """
-        fdm = self.fdm
+        fdm, flow = self.fdm, controls.of(LONGITUDINAL.vane)
         self.six_axes = condition.six_axes
         self._choose_axes()
         fdm.set_trim_status(True)  # actuators pass their input through
@@ -238,27 +242,27 @@ class Executive:
             ("ic/lat-gc-deg", 0.0),
             ("ic/long-gc-deg", 0.0),
             ("ic/psi-true-rad", 0.0),
-            ("ic/phi-rad", controls.bank_rad),
+            ("ic/phi-rad", controls.of(BANK)),
             ("ic/ve-kts", condition.eas_m_s / KT),
-            ("ic/theta-rad", alpha_rad + condition.gamma_rad),
-            ("ic/alpha-rad", alpha_rad),
+            ("ic/theta-rad", flow + condition.gamma_rad),
+            ("ic/alpha-rad", flow),
             ("ic/beta-rad", 0.0),
             ("ic/gamma-rad", condition.gamma_rad),
-            *((name, rates_rad_s.get(channel, 0.0)) for channel, name in _RATES.items()),
+            *((name, controls.of(channel)) for channel, name in _RATES.items()),
         ):
             fdm[name] = value
         if self.six_axes:
-            self._orient(alpha_rad, controls, condition.gamma_rad)
+            self._orient(controls, condition.gamma_rad)
         self.hold(controls)
         self.settle(engines_s)
 
-    def _orient(self, alpha_rad: float, controls: Controls, gamma_rad: float) -> None:
+    def _orient(self, controls: Controls, gamma_rad: float) -> None:
         """Write attitude and velocity of a straight flight with sideslip and bank, which JSBSim's own angles disturb."""
         fdm, speed = self.fdm, self.fdm["ic/vt-fps"]
-        at = straight_attitude(alpha_rad, controls.sideslip_rad, controls.bank_rad, gamma_rad)
+        at = controls.attitude(gamma_rad)
         fdm["ic/psi-true-rad"] = at.psi_rad
         fdm["ic/theta-rad"] = at.theta_rad
-        fdm["ic/phi-rad"] = controls.bank_rad
+        fdm["ic/phi-rad"] = controls.of(BANK)
         for axis, part in zip("uvw", at.velocity, strict=True):
             fdm[f"ic/{axis}-fps"] = speed * part
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
-from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
+from airtruth.simulation.simulator import BANK, Condition, Controls, Executive, SimulatorResponse
 from airtruth.units import DEG, FT, KT
 
 Array = NDArray[np.float64]
@@ -61,22 +61,35 @@ class Trim:
     Attributes
     ----------
     condition : requested flight condition.
-    alpha_rad : angle of attack [rad].
     surfaces_rad : control -> surface [rad], of the controls that fly.
-    controls : commands and throttle.
+    controls : commands, throttle and motion.
     airspeed_m_s, density_kg_m3, mass_kg : true airspeed [m/s], air density [kg/m3], mass [kg].
     residual : largest of |u_dot|, |w_dot| [m/s2] and |q_dot| [rad/s2], with lateral properties or in six axes also of
         |v_dot|, |p_dot| and |r_dot|.
     """
 
     condition: Condition
-    alpha_rad: float
     surfaces_rad: Mapping[str, float]
     controls: Controls
     airspeed_m_s: float
     density_kg_m3: float
     mass_kg: float
     residual: float
+
+    @property
+    def alpha_rad(self) -> float:
+        """Angle of attack [rad]."""
+        return self.controls.of(LONGITUDINAL.vane)
+
+    def of(self, channel: str) -> float:
+        """Value of a surface, a flow angle, the bank or an angular rate at the equilibrium [rad], [rad/s]."""
+        controls = (control for motion in MOTIONS.values() for control in motion.controls)
+        surface = next((self.surfaces_rad.get(c.name) for c in controls if c.channel == channel), None)
+        return self.controls.of(channel) if surface is None else surface
+
+    def origin(self, motion: Motion) -> Array:
+        """(signals,) values of the signals of a motion at the equilibrium, the rates per second [rad], [rad/s]."""
+        return np.array([self.of(signal.channel) for signal in motion.signals])
 
     @property
     def elevator_rad(self) -> float:
@@ -111,6 +124,11 @@ class _Problem:
             i, self.steps[2], self.largest[2], self.low[2], self.high[2], _ = _GLIDE
             self.names[i] = "flight path"
 
+    @property
+    def free(self) -> str:
+        """Channel of the angle that holds the aircraft straight in six axes."""
+        return LATERAL.vane if self.condition.straight == "wings-level" else BANK
+
     def start(self, alpha_deg: float, command_rad: float, throttle: float) -> Array:
         """(unknowns,) of a start."""
         x = np.zeros(self.count)
@@ -122,11 +140,10 @@ class _Problem:
         throttle = float(x[2]) if self.throttle is None else self.throttle
         commands = {ELEVATOR: float(x[1])}
         lateral = dict(zip(LATERAL_CONTROLS, map(float, x[3:5]), strict=False))
-        free = "sideslip_rad" if self.condition.straight == "wings-level" else "bank_rad"
-        angle: dict[str, Any] = {free: float(x[5])} if self.count == 6 else {}
+        motion = dict(zip((LONGITUDINAL.vane, self.free), (float(x[0]), *map(float, x[5:])), strict=False))
         if self.condition.six_axes:
-            return Controls(throttle, commands | lateral, **angle)
-        return Controls(throttle, commands, lateral, **angle)
+            return Controls(throttle, commands | lateral, motion=motion)
+        return Controls(throttle, commands, lateral, motion)
 
     def path(self, x: Array) -> Condition:
         """Condition of a vector of unknowns."""
@@ -135,7 +152,7 @@ class _Problem:
     def respond(self, x: Array) -> SimulatorResponse:
         """Response in the state of a vector of unknowns."""
         self.executive = self.executive.again()
-        self.executive.initialise(self.path(x), float(x[0]), self.controls(x))
+        self.executive.initialise(self.path(x), self.controls(x))
         return self.executive.respond()
 
     def residual(self, x: Array) -> Array:
@@ -199,9 +216,8 @@ def _near(problem: _Problem, trim: Trim | None) -> list[Array]:
     c = trim.controls
     third = trim.condition.gamma_rad if problem.glides else c.throttle
     lateral = c.commands_rad if problem.condition.six_axes else c.held
-    angle = c.sideslip_rad if problem.condition.straight == "wings-level" else c.bank_rad
     moved = [lateral.get(name, 0.0) for name in LATERAL_CONTROLS]
-    every = [trim.alpha_rad, c.command(ELEVATOR), third, *moved, angle]
+    every = [trim.alpha_rad, c.command(ELEVATOR), third, *moved, c.of(problem.free)]
     return [np.array(every[: problem.count])]
 
 
@@ -253,7 +269,6 @@ def _result(problem: _Problem, x: Array) -> Trim:
     airspeed, density, mass = problem.executive.surroundings()
     return Trim(
         condition=problem.path(x),
-        alpha_rad=float(x[0]),
         surfaces_rad=at.surfaces_rad,
         controls=problem.controls(x),
         airspeed_m_s=airspeed,

@@ -127,16 +127,9 @@ def _planform(known: Measured) -> Planform:
         if value is not None and not (math.isfinite(value) and (value > 0.0 or f.name == "cg")):
             raise ConfigurationError(f"{_option(f.name)} {value:g}: has to be a number above 0")
     span, area, tail = known.span_m or 0.0, known.wing_area_m2 or 0.0, known.tail_area_m2 or 0.0
-    stated = {key: getattr(known, key) for key in ("elevator_share", "cg") if getattr(known, key) is not None}
-    return Planform(
-        span_m=span,
-        wing_area_m2=area,
-        chord_m=known.chord_m or area / span,
-        tail_span_m=known.tail_span_m or math.sqrt(TAIL_ASPECT_RATIO * tail),
-        tail_area_m2=tail,
-        tail_arm_m=known.tail_arm_m or 0.0,
-        **stated,
-    )
+    usual = {"chord_m": area / span, "tail_span_m": math.sqrt(TAIL_ASPECT_RATIO * tail)}
+    stated = {f.name: getattr(known, f.name, None) for f in fields(Planform)}
+    return Planform(**usual | {name: value for name, value in stated.items() if value is not None})
 
 
 def _option(name: str) -> str:

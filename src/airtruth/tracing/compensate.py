@@ -293,7 +293,7 @@ def _undo_readings(
         vane = taken.motion.vane
         alpha = channels[vane]
         signals = channels | {vane: alpha - _origin(alpha, dt_s, taken)}
-        more = reading_increments(taken.readings, taken.states, signals, constants.chord_m, dt_s)
+        more = reading_increments(taken.readings, taken.states, signals, constants, dt_s)
     else:
         more = increments_over(taken.readings, taken.states, _signals(channels, constants, dt_s, taken), dt_s)
     for name, increment in more.items():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.channels import ATTITUDE
 from airtruth.errors import LogError, TrimError
 from airtruth.physics.gust_figures import gust_scales, side_gust
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
@@ -176,9 +177,9 @@ def _probed(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
 def _linear_lateral(s: Signals, aircraft: Aircraft, derivatives: Array) -> Plant:
     """The linear model about the start of a run, whose air holds the weight's side component there without a moment."""
     head, c = head_samples(s.dt_s), aircraft.constants
-    start = along_record(s, c.span_m)[:, :head].mean(axis=1)
+    start = along_record(s, c)[:, :head].mean(axis=1)
     start[[x.length is not None for x in LATERAL.signals]] = 0.0
-    phi = float(s.y[:head, LATERAL.output_channels.index("phi_rad")].mean())
+    phi = float(s.y[:head, LATERAL.output_channels.index(ATTITUDE[1])].mean())
     side = c.mass_kg * G0 * np.cos(float(s.theta_rad[: head * s.sub].mean())) * np.sin(phi)
     pressure = 0.5 * float(s.density_kg_m3.mean()) * float(np.mean(s.airspeed_m_s**2))
     return linear(aircraft, LATERAL, derivatives, pressure, start, np.array([-side, 0.0, 0.0]))
@@ -186,7 +187,7 @@ def _linear_lateral(s: Signals, aircraft: Aircraft, derivatives: Array) -> Plant
 
 def _probed_lateral(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
     """Tables over the angles and rates that the runs reach."""
-    every = np.concatenate([along_record(s, aircraft.constants.span_m) for s in runs], axis=1)
+    every = np.concatenate([along_record(s, aircraft.constants) for s in runs], axis=1)
     reach = {x.name: _reach([row]) for x, row in zip(LATERAL.signals, every, strict=True)}
     low, high = np.clip(reach[LATERAL.flow], -_MOST_BETA_RAD, _MOST_BETA_RAD).tolist()
     return probed_lateral(

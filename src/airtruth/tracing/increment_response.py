@@ -59,8 +59,7 @@ def linear_scale(
     airspeed = channels["airspeed_m_s"].mean(axis=1)
     density = np.asarray(air_density(channels)).mean(axis=1)
     if motion is LONGITUDINAL:
-        c = constants
-        return short_period.scale(c.wing_area_m2, c.chord_m, c.mass_kg, c.inertia_yy_kg_m2, airspeed, density)
+        return short_period.scale_of(constants, airspeed, density)
     values = values_of(constants, motion)
     assert isinstance(values, LateralValues)
     level = np.zeros_like(airspeed)

@@ -7,7 +7,7 @@ it tells of an error of the airspeed, which no output of the filter shows, is a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -25,6 +25,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion_parts import reference_length_m
 from airtruth.tracing.answer import Evidence, TraceAnswer
 from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.inference.kinematic_likelihood import KinematicLikelihood
@@ -59,25 +60,18 @@ def kinematic_check(
         if fitted:
             parts.append(log.select(run_ids=fitted))
     try:
-        return _CHECKS[motion.name](parts, aircraft)
+        check, kinematics = _CHECKS[motion.name]
+        length_m = reference_length_m(aircraft.constants, kinematics.reference)
+        return check(parts, declared_errors(aircraft, kinematics), length_m or None)
     except LogError:
         return None
 
 
-def _of_pitch(logs: Sequence[FlightLog], aircraft: Aircraft) -> CheckResult:
-    return check_kinematics(logs, declared_errors(aircraft, kinematics_model.LONGITUDINAL), aircraft.chord_m)
-
-
-def _of_side(logs: Sequence[FlightLog], aircraft: Aircraft) -> CheckResult:
-    known = declared_errors(aircraft, kinematics_side.LATERAL)
-    return check_lateral(logs, known, aircraft.constants.span_m or None)
-
-
-_CHECKS: Final[Mapping[str, Callable[[Sequence[FlightLog], Aircraft], CheckResult]]] = {
-    "longitudinal": _of_pitch,
-    "lateral": _of_side,
+_CHECKS: Final = {
+    "longitudinal": (check_kinematics, kinematics_model.LONGITUDINAL),
+    "lateral": (check_lateral, kinematics_side.LATERAL),
 }
-"""Name of a motion -> kinematic check of logs with an aircraft's declared errors."""
+"""Name of a motion -> its kinematic check and what the check depends on."""
 
 
 def starts_of(check: CheckResult | None, dt_s: float) -> tuple[dict[str, float], ...]:

@@ -15,7 +15,7 @@ from airtruth.aircraft import Aircraft, Sensor
 from airtruth.errors import FlightError, TrimError
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.disposable import isolated, isolated_flight
-from airtruth.simulation.replay_lateral import replayed
+from airtruth.simulation.replay import replay
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.tracks import Track, substeps
 from airtruth.simulation.trim import Trim, trim
@@ -140,7 +140,7 @@ def _errors(problem: TraceProblem, aircraft: Aircraft, weights: list[Array]) -> 
         flown = isolated_flight(
             measured.airspeed_m_s.size,
             f"the replay of {aircraft.name}",
-            replayed,
+            replay,
             aircraft,
             trims[at],
             measured,

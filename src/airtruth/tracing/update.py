@@ -268,15 +268,15 @@ def _write_flying(
 ) -> None:
     """An aircraft without a JSBSim model, as one that flies in level flight at the trim of the fitted records."""
     signals, trim = revision.signals, revision.corrections.trim
-    is_pitch = revision.corrections.motion is LONGITUDINAL
-    alpha_rad = trim["alpha"] if is_pitch else float(np.mean([s.alpha_rad[0] for s in signals]))
-    at = TrimPoint(
-        airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
-        density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
-        alpha_rad=alpha_rad,
-        elevator_rad=trim["elevator"] if is_pitch else 0.0,
-        az_m_s2=-G0 * math.cos(alpha_rad),
+    if revision.corrections.motion is LONGITUDINAL:
+        attack, surface = trim[LONGITUDINAL.flow], trim[LONGITUDINAL.controls[0].name]
+    else:
+        attack, surface = float(np.mean([s.alpha_rad[0] for s in signals])), 0.0
+    airspeed, density = (
+        float(np.mean([x[0] for x in own]))
+        for own in ([s.airspeed_m_s for s in signals], [s.density_kg_m3 for s in signals])
     )
+    at = TrimPoint(airspeed, density, attack, surface, -G0 * math.cos(attack))
     with atomic.new_folder(folder) as new:
         write_corrected(aircraft, aircraft.file.derivatives, at, change, new, note, origin)
 

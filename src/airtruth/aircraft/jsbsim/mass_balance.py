@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
+from airtruth.aircraft.probe import Constants
 from airtruth.errors import AircraftError
 from airtruth.physics.terms import DeclaredTerm, declared_total
-from airtruth.quantity import Strict
 from airtruth.units import FT, INCH, LB, SLUG
 
 _TO_SI: Final = {
@@ -28,16 +28,6 @@ _DEFAULTS: Final = {"length": "IN", "mass": "LBS", "inertia": "SLUG*FT2"}
 """JSBSim's unit of an element without one."""
 
 
-class Masses(Strict):
-    """Mass [kg], pitch, roll and yaw inertia [kg m2] and chord [m] of the aircraft as loaded."""
-
-    mass_kg: float
-    inertia_kg_m2: float
-    chord_m: float
-    inertia_xx_kg_m2: float = 0.0
-    inertia_zz_kg_m2: float = 0.0
-
-
 @dataclass(frozen=True)
 class _Item:
     """A mass [kg] at a location, x aft, y right and z up [m]."""
@@ -48,7 +38,7 @@ class _Item:
     z_m: float
 
 
-def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Masses, where: str) -> None:
+def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Constants, where: str) -> None:
     """Write mass, inertias, CG and thrust line into a model; the factors of controls are those of their surfaces.
 
     Parameters
@@ -81,7 +71,7 @@ def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Masses, where: s
             _move(balance, "x", shift * loaded.chord_m * loaded.mass_kg / before[0].mass_kg, where)
             about = _about_centre(_items(root, balance)) - _about_centre(before)
         if inertia != 1.0 or about:
-            _add(balance, "iyy", (inertia - 1.0) * loaded.inertia_kg_m2 - about, "inertia", where)
+            _add(balance, "iyy", (inertia - 1.0) * loaded.inertia_yy_kg_m2 - about, "inertia", where)
         sideways = 0.0
         if aside:
             before = _items(root, balance)

@@ -19,21 +19,22 @@ from airtruth.physics.motion import LONGITUDINAL
 ESTIMATED: Final = (*LONGITUDINAL.parameters, *LONGITUDINAL.modal)
 """The eight parameters of a column: six derivatives [-], wn [rad/s] and zeta [-]."""
 
-DECIMALS: Final[Mapping[str, int]] = {
-    "CLalpha": 3, "CLq": 2, "CLde": 3, "Cmalpha": 3, "Cmq": 2, "Cmde": 3, "wn_rad_s": 3, "zeta": 3,
-}  # fmt: skip
+DECIMALS: Final[Mapping[str, int]] = dict(zip(ESTIMATED, (3, 2, 3, 3, 2, 3, 3, 3), strict=True))
 """Decimals of the paper's true values [-]."""
 
-SYMBOLS: Final[Mapping[str, str]] = {
-    "CLalpha": r"$C_{L\alpha}$",
-    "CLq": r"$C_{Lq}$",
-    "CLde": r"$C_{L\delta_e}$",
-    "Cmalpha": r"$C_{m\alpha}$",
-    "Cmq": r"$C_{mq}$",
-    "Cmde": r"$C_{m\delta_e}$",
-    "wn_rad_s": r"$\omega_n$ [rad/s]",
-    "zeta": r"$\zeta$",
-}
+_SUBSCRIPTS: Final = (r"\alpha", "q", r"\delta_e")
+"""Symbols of the signals, for LaTeX."""
+SYMBOLS: Final[Mapping[str, str]] = dict(
+    zip(
+        ESTIMATED,
+        (
+            *(rf"$C_{{{c}{x}}}$" for c in "Lm" for x in _SUBSCRIPTS),
+            r"$\omega_n$ [rad/s]",
+            r"$\zeta$",
+        ),
+        strict=True,
+    )
+)
 """Symbols of the parameters, for LaTeX and matplotlib; that of wn has its unit."""
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.physics import dryden, lateral_gusts
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.simulation.campaign import streams
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
 
@@ -22,17 +24,18 @@ class Air:
     Attributes
     ----------
     u_m_s, w_m_s : along the flight path and downward [m/s].
-    q_rad_s : rotation, nose-up positive [rad/s]; None without rotary gusts.
     v_m_s : to the right [m/s]; None without side gusts.
-    p_rad_s, r_rad_s : rotation, right wing down and nose right positive [rad/s]; None without side or rotary gusts.
+    rotation_rad_s : channel of an angular rate -> rotation about that axis, in its sense [rad/s]; none without rotary gusts.
     """
 
     u_m_s: Array
     w_m_s: Array
-    q_rad_s: Array | None = None
     v_m_s: Array | None = None
-    p_rad_s: Array | None = None
-    r_rad_s: Array | None = None
+    rotation_rad_s: Mapping[str, Array] = field(default_factory=dict)
+
+    def rotation_of(self, motion: Motion) -> dict[str, Array]:
+        """The rotations about the axes of a motion."""
+        return {name: self.rotation_rad_s[name] for name in motion.gyros if name in self.rotation_rad_s}
 
 
 def air_of(plan: Plan, run: PlannedRun, airspeed_m_s: float) -> Air:
@@ -45,35 +48,35 @@ def air_of(plan: Plan, run: PlannedRun, airspeed_m_s: float) -> Air:
     plan, run : the campaign and the run.
     airspeed_m_s : true airspeed of its trim [m/s].
     """
-    u, w, q = _in_the_pitch_plane(plan, run, airspeed_m_s)
+    u, w, *turning = _in_the_pitch_plane(plan, run, airspeed_m_s)
+    rotation = dict(zip(LONGITUDINAL.gyros, turning, strict=False))
     if not plan.campaign.side_gusts:
-        return Air(u, w, q)
-    return Air(u, w, q, *_to_the_side(plan, run, airspeed_m_s))
+        return Air(u, w, None, rotation)
+    v, *turning = _to_the_side(plan, run, airspeed_m_s)
+    return Air(u, w, v, rotation | dict(zip(LATERAL.gyros, turning, strict=False)))
 
 
-def _in_the_pitch_plane(plan: Plan, run: PlannedRun, airspeed: float) -> tuple[Array, Array, Array | None]:
+def _in_the_pitch_plane(plan: Plan, run: PlannedRun, airspeed: float) -> list[Array]:
+    """u, w and, of rotary gusts, q."""
     rotary, sigma_u, sigma_w = plan.campaign.gust.rotary, run.sigma_u_m_s, run.sigma_w_m_s
     if sigma_u == 0.0 and sigma_w == 0.0:
         still = np.zeros(plan.samples)
-        return still, still, -still if rotary else None
+        return [still, still, *([-still] if rotary else [])]
     unit = _unit_gust(run.length_u_m, run.length_w_m, airspeed, _span(plan), plan.dt_s)
     u, w, *q = (
         _simulated(plan, run, unit, streams.GUST) * np.array([[sigma_u], [sigma_w], [sigma_w]])[: 2 + rotary]
     )
-    return u, w, -q[0] if rotary else None
+    return [u, w, *(-turning for turning in q)]
 
 
-def _to_the_side(plan: Plan, run: PlannedRun, airspeed: float) -> tuple[Array, Array | None, Array | None]:
+def _to_the_side(plan: Plan, run: PlannedRun, airspeed: float) -> list[Array]:
+    """v and, of rotary gusts, p and r."""
     rotary, sigma_v, sigma_w = plan.campaign.gust.rotary, run.sigma_v_m_s, run.sigma_w_m_s
     if sigma_v == 0.0 and sigma_w == 0.0:
-        still = np.zeros(plan.samples)
-        return (still, still, still) if rotary else (still, None, None)
+        return (1 + 2 * rotary) * [np.zeros(plan.samples)]
     unit = _unit_side_gust(run.length_v_m, run.length_w_m, airspeed, _span(plan), plan.dt_s)
-    v, *turning = (
-        _simulated(plan, run, unit, streams.SIDE_GUST)
-        * np.array([[sigma_v], [sigma_w], [sigma_v]])[: 1 + 2 * rotary]
-    )
-    return (v, turning[0], turning[1]) if rotary else (v, None, None)
+    deviations = np.array([[sigma_v], [sigma_w], [sigma_v]])[: 1 + 2 * rotary]
+    return [*(_simulated(plan, run, unit, streams.SIDE_GUST) * deviations)]
 
 
 def _simulated(plan: Plan, run: PlannedRun, unit: dryden.DiscreteGust, stream: int) -> Array:

@@ -27,7 +27,7 @@ from airtruth.simulation.campaign.inputs import commands
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.lateral_feedback import FED, LateralFeedback
-from airtruth.simulation.linearise import Linearisation, lateral_truth, linearise
+from airtruth.simulation.linearise import Linearisation, linearise, truth_of
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS, sample
 from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
@@ -216,20 +216,17 @@ class Pilot:
             command_rad=command.get(ELEVATOR, still),
             gust_u_m_s=air.u_m_s,
             gust_w_m_s=air.w_m_s,
-            gust_q_rad_s=air.q_rad_s,
+            rotation_rad_s=air.rotation_of(LONGITUDINAL),
             damper_gain_s=gains.damper_gain_s,
             attitude_gain=gains.attitude_gain,
             surface=flown[0].surface,
         )
         if gains.damper_gain_s or gains.attitude_gain:
-            inputs = replace(
-                inputs,
-                q_error_rad_s=self._error("q_rad_s", run),
-                theta_error_rad=self._error("theta_rad", run),
-            )
+            seen = (*LONGITUDINAL.gyros, "theta_rad")
+            inputs = replace(inputs, errors={name: self._error(name, run) for name in seen})
         if plan.campaign.lateral:
             lateral = {name: command.get(name, still) for name in LATERAL_CONTROLS}
-            turning = LateralInputs(lateral, air.v_m_s, air.p_rad_s, air.r_rad_s, self._feedback(run))
+            turning = LateralInputs(lateral, air.v_m_s, air.rotation_of(LATERAL), self._feedback(run))
             inputs = replace(inputs, lateral=turning)
         return prepared.flight.fly(inputs)
 
@@ -267,7 +264,7 @@ class Pilot:
         logged = measure.log_channels(
             truth, self._models, noise, plan.dt_s * every, plan.log_every // every, self._readings
         )
-        samples = logged["alpha_rad"].shape[1]
+        samples = logged[LONGITUDINAL.vane].shape[1]
         return FlightLog(
             metadata=_log_metadata(plan),
             run_ids=tuple(run.run_id for run in flown),
@@ -317,22 +314,16 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
     prepared : its flight condition; None for a run that failed.
     """
     result: dict[str, object] = {"run_id": run.run_id, "status": "ok" if prepared else "failed"}
-    sides = {"": "plus", "_minus": "minus", "_central": "central"}
-    for suffix, side in sides.items():
-        values = getattr(prepared.linear, side) if prepared else np.full(len(LONGITUDINAL.parameters), np.nan)
-        result |= {name + suffix: float(v) for name, v in zip(LONGITUDINAL.parameters, values, strict=True)}
-    result |= {name: prepared.linear.modes[name] if prepared else np.nan for name in LONGITUDINAL.modal}
     at = prepared.trim if prepared else None
+    result |= truth_of(LONGITUDINAL, prepared.linear if prepared else None, at)
     result |= {
-        "trim_alpha_rad": at.alpha_rad if at else np.nan,
-        "trim_elevator_rad": at.elevator_rad if at else np.nan,
         "trim_throttle": at.controls.throttle if at else np.nan,
         "airspeed_m_s": at.airspeed_m_s if at else np.nan,
         "density_kg_m3": at.density_kg_m3 if at else np.nan,
         "dynamic_pressure_pa": 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 if at else np.nan,
     }
     if run.condition.six_axes:
-        result |= lateral_truth(prepared.lateral if prepared else None, at)
+        result |= truth_of(LATERAL, prepared.lateral if prepared else None, at)
     for name in (
         "eas_m_s",
         "altitude_m",

@@ -13,7 +13,7 @@ import numpy as np
 from airtruth.channels import SIGNALS
 from airtruth.errors import LogError, choices, counted
 from airtruth.logs.names import chunk_file
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS
 from airtruth.physics.terms import ELEVATOR
 from airtruth.result import shortened
 from airtruth.simulation.campaign.chunk import FAILED, INTERRUPTED, OK, Outcome
@@ -23,20 +23,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-PLOTTED: Final = {c.channel: c.name for c in LONGITUDINAL.controls} | {
-    y.channel: y.name for y in LONGITUDINAL.outputs
+PLOTTED: Final = {
+    motion.name: {c.channel: c.name for c in motion.controls} | {y.channel: y.name for y in motion.outputs}
+    for motion in MOTIONS.values()
 }
-"""Channels, with their labels, that `CampaignResult.plot` shows: the input of the short period and its measured outputs."""
-PLOTTED_LATERAL: Final = {
-    "aileron_rad": "aileron",
-    "rudder_rad": "rudder",
-    "beta_rad": "beta",
-    "phi_rad": "phi",
-    "p_rad_s": "p",
-    "r_rad_s": "r",
-    "ay_m_s2": "ay",
-}
-"""Those of the lateral-directional motion."""
+"""Motion -> channels, with their labels, that `CampaignResult.plot` shows: its inputs and its measured outputs."""
 SHOWN_REASONS: Final = 5
 """Reasons of failure that a summary lists (judgement: it stays on one screen); `to_frame` has them all."""
 
@@ -135,8 +126,8 @@ class CampaignResult:
             raise LogError(f"{self.folder}: run {shown!r} was not flown; {choices(shown, flown)}")
         chunk = int(self.plan.table["chunk"].iloc[flown[shown]])
         campaign = self.plan.campaign
-        plotted = PLOTTED if ELEVATOR in campaign.moved or not campaign.lateral else {}
-        plotted = plotted | (PLOTTED_LATERAL if campaign.lateral else {})
+        plotted = PLOTTED[LONGITUDINAL.name] if ELEVATOR in campaign.moved or not campaign.lateral else {}
+        plotted = plotted | (PLOTTED[LATERAL.name] if campaign.lateral else {})
         log = read_log(self.folder / "logs" / chunk_file(chunk), run_ids=[shown], columns=list(plotted))
         rows = math.ceil(len(plotted) / 2)
         with style.applied():

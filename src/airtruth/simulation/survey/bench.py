@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
+from airtruth.aircraft.model import SurfaceProperties
 from airtruth.aircraft.probe import Constants, constants_of
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.terms import ELEVATOR
@@ -21,6 +23,8 @@ Array = NDArray[np.float64]
 
 STEP_S: Final = 1.0 / 200.0
 """Simulation step [s]: that of the campaigns."""
+_MOTION: Final = {LONGITUDINAL.vane: 4.0 * DEG}
+"""Channel of the motion -> its value in the state that is examined [rad] (judgement: away from the stall)."""
 _DENSITY: Final = 1.225
 """Density of the air at sea level [kg/m3] (standard atmosphere)."""
 
@@ -33,14 +37,13 @@ class ModelBench:
     ----------
     folder, model : folder of aircraft.toml and its [jsbsim] table as known so far.
     constants : geometry and mass.
-    condition : flight condition; alpha_rad, throttle : state in it.
+    condition : flight condition; throttle : lever in it.
     """
 
     folder: Path
     model: JsbsimModel
     constants: Constants
     condition: Condition
-    alpha_rad: float = 4.0 * DEG
     throttle: float = 0.6
 
     @property
@@ -50,6 +53,11 @@ class ModelBench:
         file = AircraftFile.model_construct(name=name, jsbsim=self.model)
         return Aircraft(folder=self.folder, file=file, constants=self.constants)
 
+    @property
+    def surface(self) -> SurfaceProperties:
+        """The control surface of the pitch plane."""
+        return self.model.surfaces(LONGITUDINAL)[ELEVATOR]
+
     def known(self, **changes: object) -> ModelBench:
         """The bench with other entries of the [jsbsim] table."""
         return replace(self, model=self.model.model_copy(update=changes))
@@ -58,37 +66,28 @@ class ModelBench:
         self,
         writes: Mapping[str, float] | None = None,
         *,
-        alpha_rad: float | None = None,
-        q_rad_s: float = 0.0,
+        off: Mapping[str, float] = MappingProxyType({}),
         speed: float = 1.0,
         throttle: float | None = None,
-        lateral: Mapping[str, float] | None = None,
     ) -> Executive:
         """An executive in a steady state.
 
         Parameters
         ----------
         writes : further properties, written after the controls.
-        alpha_rad, q_rad_s : of the state; speed : over that of the condition; throttle : lever.
-        lateral : p_rad_s, r_rad_s, beta_rad or phi_rad of the state [rad/s], [rad]; the others are zero.
+        off : channel of the motion -> departure from `_MOTION` [rad], [rad/s]; one of the lateral motion needs six axes.
+        speed : over that of the condition; throttle : lever.
         """
         executive = Executive(self.aircraft, STEP_S)
         for name, value in (writes or {}).items():
             executive.fdm[name] = value
         condition = replace(self.condition, eas_m_s=self.condition.eas_m_s * speed)
         lever = self.throttle if throttle is None else throttle
-        command = (writes or {}).get(self.model.elevator.command, 0.0) / self.model.elevator.command_per_rad
-        alpha = self.alpha_rad if alpha_rad is None else alpha_rad
-        rates = dict(lateral or {})
-        controls = Controls(
-            lever,
-            {ELEVATOR: command},
-            bank_rad=rates.pop("phi_rad", 0.0),
-            sideslip_rad=rates.pop(LATERAL.vane, 0.0),
-        )
-        if lateral is not None:
+        command = (writes or {}).get(self.surface.command, 0.0) / self.surface.command_per_rad
+        motion = dict(_MOTION) | {name: _MOTION.get(name, 0.0) + more for name, more in off.items()}
+        if not off.keys().isdisjoint(LATERAL.output_channels):
             condition = replace(condition, straight="wings-level")
-        executive.initialise(condition, alpha, controls, rates | {LONGITUDINAL.gyros[0]: q_rad_s})
+        executive.initialise(condition, Controls(lever, {ELEVATOR: command}, motion=motion))
         return executive
 
 

@@ -11,13 +11,11 @@ import numpy as np
 
 from airtruth.aircraft.model import LateralProperties, SurfaceProperties
 from airtruth.errors import AircraftError
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.simulation.survey.bench import ModelBench, read
 from airtruth.simulation.survey.names import ModelNames
 from airtruth.units import DEG
 
-STANDARD: Final = "fcs/elevator-cmd-norm"
-"""Elevator command of JSBSim's own flight controls."""
 _REACH: Final = 0.1
 """Command for which responses are measured, to both sides [units of the command] (judgement: a tenth of the stick)."""
 _MOVES: Final = 1e-6
@@ -32,6 +30,11 @@ _INTEGRATES: Final = 1e-3
 """Motion of a surface between these times that shows an integrator [its unit] (judgement)."""
 _STRAIGHT: Final = 1e-6
 """Lateral acceleration that counts as an asymmetry [m/s2], [rad/s2]: the tolerance of a trim."""
+_MOVED: Final = {"vane": 1.0 * DEG, "gyro": 5.0 * DEG, "attitude": 5.0 * DEG}
+"""Instrument of an output -> motion under which a surface has to stand still [rad], [rad/s] (judgement: those of a small
+manoeuvre)."""
+_FASTER: Final = 1.03
+"""The same of the airspeed in the pitch plane, over that of the condition [-] (judgement)."""
 _UNITS: Final = (("-rad", 1.0), ("-deg", DEG), ("-norm", 0.0))
 """Ends of the names of surfaces in the order of preference, and radians per unit; 0 for unknown."""
 
@@ -42,7 +45,7 @@ class SurveyedControl:
 
     Attributes
     ----------
-    name : "elevator", "aileron" or "rudder".
+    name : of the control.
     standard : its command in JSBSim's own flight controls.
     command, surface : names of other commands, and of surfaces (judgement).
     acceleration : attribute of `airtruth.simulation.simulator.SimulatorResponse` that it changes; a positive surface lowers it.
@@ -60,16 +63,41 @@ class SurveyedControl:
     axis: str = ""
 
 
-ELEVATOR: Final = SurveyedControl(
-    "elevator",
-    STANDARD,
-    re.compile(r"elev.*cmd|cmd.*elev|pitch.*cmd|stick|stabilator.*cmd", re.IGNORECASE),
-    re.compile(r"elev|stab|htail|canard|pitch", re.IGNORECASE),
-    "q_dot_rad_s2",
-    "pitching",
-    "pitches the nose up",
-)
-"""The elevator, positive with the trailing edge down."""
+SURVEYED: Final = {
+    control.name: control
+    for control in (
+        SurveyedControl(
+            "elevator",
+            "fcs/elevator-cmd-norm",
+            re.compile(r"elev.*cmd|cmd.*elev|pitch.*cmd|stick|stabilator.*cmd", re.IGNORECASE),
+            re.compile(r"elev|stab|htail|canard|pitch", re.IGNORECASE),
+            "q_dot_rad_s2",
+            "pitching",
+            "pitches the nose up",
+        ),
+        SurveyedControl(
+            "aileron",
+            "fcs/aileron-cmd-norm",
+            re.compile(r"ail.*cmd|cmd.*ail|roll.*cmd|elevon.*cmd|stick", re.IGNORECASE),
+            re.compile(r"ail|elevon|flaperon|roll|wing-warp|spoiler|taileron", re.IGNORECASE),
+            "p_dot_rad_s2",
+            "rolling",
+            "rolls the right wing down",
+            "ROLL",
+        ),
+        SurveyedControl(
+            "rudder",
+            "fcs/rudder-cmd-norm",
+            re.compile(r"rud.*cmd|cmd.*rud|yaw.*cmd|pedal", re.IGNORECASE),
+            re.compile(r"rud|yaw", re.IGNORECASE),
+            "r_dot_rad_s2",
+            "yawing",
+            "yaws the nose right",
+            "YAW",
+        ),
+    )
+}
+"""Name of a control -> what is known of it; their positive senses are those of `airtruth.channels`."""
 
 
 @dataclass(frozen=True)
@@ -179,17 +207,51 @@ def _surface(
     )
 
 
-def feedback_rad(bench: ModelBench) -> float:
-    """Largest motion of the surface at a held command, by alpha, pitch rate or airspeed [rad]."""
-    surface, scale = bench.model.elevator.surface, bench.model.elevator.surface_rad
-    states = (
-        bench.at(),
-        bench.at(alpha_rad=bench.alpha_rad + 1.0 * DEG),
-        bench.at(q_rad_s=5.0 * DEG),
-        bench.at(speed=1.03),
-    )
-    angles = [float(s.fdm[surface]) * scale for s in states]
-    return max(angles) - min(angles)
+def with_controls(
+    bench: ModelBench, names: ModelNames, motion: Motion
+) -> tuple[ModelBench, list[str], list[str]]:
+    """Find the controls of a motion, and switch their feedback off where a property does it, or carry it.
+
+    Returns
+    -------
+    The bench, notes, and decisions for the user. A model without one of the lateral controls flies in the pitch plane alone.
+
+    Raises
+    ------
+    AircraftError
+        If it has no control of the pitch plane.
+    """
+    notes: list[str] = []
+    decisions: list[str] = []
+    for control in motion.controls:
+        try:
+            found = control_of(bench, names, SURVEYED[control.name])
+        except AircraftError as error:
+            if motion is LONGITUDINAL:
+                raise
+            notes.append(f"lateral flights are not possible: {error}")
+            return bench.known(**dict.fromkeys(c.name for c in motion.controls)), notes, decisions
+        notes += found.notes
+        decisions += found.decisions
+        known = bench.model.surfaces(motion).get(control.name, found.surface)
+        bench = bench.known(**{control.name: known.model_copy(update=found.surface.model_dump())})
+    bench, more, to_decide = _without_feedback(bench, names, motion)
+    return bench, notes + more, decisions + to_decide
+
+
+def feedback_rad(bench: ModelBench, motion: Motion) -> dict[str, float]:
+    """Largest motion of each surface of a motion at held commands, by the outputs of the motion and the airspeed [rad]."""
+    states = [bench.at()]
+    for output in motion.outputs:
+        if not output.late:
+            states.append(bench.at(off={output.channel: _MOVED[output.instrument]}))
+    if motion is LONGITUDINAL:
+        states.append(bench.at(speed=_FASTER))
+    result = {}
+    for name, surface in bench.model.surfaces(motion).items():
+        angles = [float(s.fdm[surface.surface]) * surface.surface_rad for s in states]
+        result[name] = max(angles) - min(angles)
+    return result
 
 
 def switched_over(bench: ModelBench, names: ModelNames) -> Iterator[tuple[ModelBench, str]]:
@@ -202,34 +264,38 @@ def switched_over(bench: ModelBench, names: ModelNames) -> Iterator[tuple[ModelB
             yield bench.known(set={**bench.model.set, name: value}), f"{name} = {value:g}"
 
 
-def without_feedback(bench: ModelBench, names: ModelNames) -> tuple[ModelBench, list[str], list[str]]:
-    """Switch feedback to the elevator off where a property does it, or carry it.
-
-    Returns
-    -------
-    The bench, notes, and decisions for the user.
-    """
-    moves = feedback_rad(bench)
-    if moves <= FEEDBACK_RAD:
+def _without_feedback(
+    bench: ModelBench, names: ModelNames, motion: Motion
+) -> tuple[ModelBench, list[str], list[str]]:
+    moves, surfaces = feedback_rad(bench, motion), bench.model.surfaces(motion)
+    if max(moves.values()) <= FEEDBACK_RAD:
         return bench, [], []
     for switched, setting in switched_over(bench, names):
-        if feedback_rad(switched) <= FEEDBACK_RAD and turns(switched, bench.model.elevator.command, ELEVATOR):
-            return switched, [f"augmentation: {setting} switches the feedback to the elevator off"], []
-    carried = bench.model.elevator.model_copy(update={"feedback": True})
-    return (
-        bench.known(elevator=carried),
-        [
-            f"augmentation: the surface moves by {moves / DEG:.2g} deg with the motion at a held command; it is carried"
-        ],
-        ["augmentation: fly with the feedback, or write into jsbsim.set the property that switches it off"],
+        if max(feedback_rad(switched, motion).values()) <= FEEDBACK_RAD and all(
+            turns(switched, surface.command, SURVEYED[name]) for name, surface in surfaces.items()
+        ):
+            off = f"augmentation: {setting} switches the feedback to the {' and '.join(surfaces)} off"
+            return switched, [off], []
+    notes, carried = [], {}
+    for name, surface in surfaces.items():
+        if moves[name] > FEEDBACK_RAD:
+            carried[name] = surface.model_copy(update={"feedback": True})
+            notes.append(
+                f"augmentation: the {name} moves by {moves[name] / DEG:.2g} deg with the motion at a held command; it is carried"
+            )
+    decision = (
+        f"augmentation: fly with the feedback to the {' and '.join(carried)}, or write into jsbsim.set the property that "
+        "switches it off"
     )
+    return bench.known(**carried), notes, [decision]
 
 
 def integrated(bench: ModelBench, names: ModelNames) -> list[str]:
     """Surfaces that go on moving at a held pitch rate and command: a fly-by-wire integrates the error."""
     manager = bench.at().fdm.get_property_manager()
     surfaces = [n for n in names.aerodynamic if n.startswith("fcs/") and "-pos" in n and manager.hasNode(n)]
-    early, late = (read(bench.known(engine_start_s=s).at(q_rad_s=5.0 * DEG), surfaces) for s in _HELD_S)
+    pitching = {LONGITUDINAL.gyros[0]: _MOVED["gyro"]}
+    early, late = (read(bench.known(engine_start_s=s).at(off=pitching), surfaces) for s in _HELD_S)
     return [n for n, a, b in zip(surfaces, early, late, strict=True) if abs(b - a) > _INTEGRATES]
 
 
@@ -245,7 +311,7 @@ def lateral_of(bench: ModelBench) -> tuple[LateralProperties | None, list[str]]:
         np.array(
             [
                 getattr(bench.at({name: _REACH}).respond(), key) - getattr(r, key)
-                for key in ("p_dot_rad_s2", "r_dot_rad_s2")
+                for key in (SURVEYED[control].acceleration for control in commands)
             ]
         )
         for _, name in found
@@ -257,7 +323,7 @@ def lateral_of(bench: ModelBench) -> tuple[LateralProperties | None, list[str]]:
 
 __all__ = [
     "FEEDBACK_RAD",
-    "STANDARD",
+    "SURVEYED",
     "Found",
     "SurveyedControl",
     "control_of",
@@ -266,5 +332,5 @@ __all__ = [
     "lateral_of",
     "switched_over",
     "turns",
-    "without_feedback",
+    "with_controls",
 ]

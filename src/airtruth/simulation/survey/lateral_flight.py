@@ -10,11 +10,11 @@ import numpy as np
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import FlightError, TrimError
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS, Manoeuvre, sample
-from airtruth.simulation.simulator import Straight, jsbsim_model
+from airtruth.simulation.simulator import BANK, Straight, jsbsim_model
 from airtruth.simulation.survey.bench import STEP_S
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG
@@ -33,7 +33,7 @@ _SECONDS: Final = (12.0, 6.0, 4.0)
 """Lengths of the record with both doublets that are tried [s] (judgement: shorter for an aircraft that is unstable in pitch)."""
 _FOLLOWS: Final = 0.2
 """Share of a doublet that the surface has to follow [-] (judgement: feedback may take most of it)."""
-_MOST: Final = {"phi_rad": 45.0 * DEG, "beta_rad": 12.0 * DEG, "alpha_rad": 10.0 * DEG}
+_MOST: Final = {BANK: 45.0 * DEG, LATERAL.vane: 12.0 * DEG, LONGITUDINAL.vane: 10.0 * DEG}
 """Largest departures from the trim in a sound record [rad] (judgement: inside the range of most tables)."""
 
 
@@ -85,8 +85,8 @@ def flown_laterally(aircraft: Aircraft, at: Trim) -> LateralTest:
     c = found.controls
     known = LateralTest(
         straight=found.condition.straight,
-        beta_deg=c.sideslip_rad / DEG,
-        phi_deg=c.bank_rad / DEG,
+        beta_deg=c.of(LATERAL.vane) / DEG,
+        phi_deg=c.of(BANK) / DEG,
         surfaces_deg={name: found.surfaces_rad[name] / DEG for name in LATERAL_CONTROLS},
         derivatives=dict(zip(LATERAL.parameters, linear.central.tolist(), strict=True)),
         modes=dict(linear.modes),
@@ -141,7 +141,7 @@ def _ranges(aircraft: Aircraft, at: Trim, test: LateralTest) -> tuple[tuple[floa
         moved_deg = float(np.ptp(flown[control.channel])) / DEG
         if moved_deg < _FOLLOWS * 2.0 * amplitude_deg:
             return (), f"a doublet of {amplitude_deg:g} deg moves the {control.name} by {moved_deg:.2g} deg"
-    return tuple(float(np.ptp(flown[name])) / DEG for name in ("beta_rad", "phi_rad")), ""
+    return tuple(float(np.ptp(flown[name])) / DEG for name in (LATERAL.vane, BANK)), ""
 
 
 __all__ = ["LateralTest", "flown_laterally"]

@@ -15,11 +15,11 @@ from airtruth.aircraft.model import ElevatorProperties, ThrottleProperties
 from airtruth.aircraft.probe import model_file, wheel_root
 from airtruth.errors import AircraftError, AirtruthError
 from airtruth.isolation.protocol import Reply
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.survey import bench as benches
 from airtruth.simulation.survey import controls, engines, envelope
 from airtruth.simulation.survey.bench import ModelBench
-from airtruth.simulation.survey.lateral import with_lateral_controls
 from airtruth.simulation.survey.lateral_flight import flown_laterally
 from airtruth.simulation.survey.names import ModelNames, names_of
 
@@ -60,9 +60,9 @@ def survey(folder: str, model: str, root: str) -> Reply:
 
 
 def _first(model: str, root: str) -> dict[str, Any]:
-    elevator = ElevatorProperties(command=controls.STANDARD)
+    pitch = ElevatorProperties(command=controls.SURVEYED[ELEVATOR].standard)
     none = ThrottleProperties(command=())
-    return {"model": model, "root": root, "elevator": elevator, "throttle": none}
+    return {"model": model, "root": root, ELEVATOR: pitch, "throttle": none}
 
 
 def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, Any]:
@@ -71,17 +71,13 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
     powered = engines.engines_of(bench, names)
     notes += powered.notes
     decisions += powered.decisions
-    found = controls.control_of(powered.bench, names, controls.ELEVATOR)
-    notes += found.notes
-    decisions += found.decisions
-    bench = powered.bench.known(elevator=ElevatorProperties(**found.surface.model_dump()))
-    bench, more, to_decide = controls.without_feedback(bench, names)
+    bench, more, to_decide = controls.with_controls(powered.bench, names, LONGITUDINAL)
     notes += more
     decisions += to_decide
-    integrating = controls.integrated(bench, names) if bench.model.elevator.feedback else []
-    if bench.model.elevator.surface in integrating:
+    integrating = controls.integrated(bench, names) if bench.surface.feedback else []
+    if bench.surface.surface in integrating:
         return {"integrating": integrating, "jsbsim": bench.model.model_dump()}
-    bench, more, to_decide = with_lateral_controls(bench, names)
+    bench, more, to_decide = controls.with_controls(bench, names, LATERAL)
     notes += more
     decisions += to_decide
     lateral, more = controls.lateral_of(bench)
@@ -92,7 +88,7 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
     points = envelope.envelope_of(bench)
     at = envelope.first_condition(bench.aircraft, points)
     if at is None and bench.model.throttle.command:
-        reason = envelope.cause(points, bench.model.elevator.feedback)
+        reason = envelope.cause(points, bench.surface.feedback)
         bench = bench.known(throttle=ThrottleProperties(command=()), engine_start_s=0.0)
         points = envelope.envelope_of(bench)
         at = envelope.first_condition(bench.aircraft, points)
@@ -106,7 +102,7 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
         "condition": None,
         "flight": None,
         "lateral_flight": None,
-        "cause": "" if at else envelope.cause(points, bench.model.elevator.feedback),
+        "cause": "" if at else envelope.cause(points, bench.surface.feedback),
     }
     if at is not None:
         c = at.condition

@@ -1,6 +1,6 @@
 """The recursion of `airtruth.tracing.model.corners` after every small step of the parameters at once.
 
-Steps are the last axis of each array, which the inner loops run along; the first step is none.
+SmallSteps are the last axis of each array, which the inner loops run along; the first step is none.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class CornerSlopes(NamedTuple):
     scale: Array
 
 
-class Steps(NamedTuple):
+class SmallSteps(NamedTuple):
     """Small steps: of which parameter each is, and the inverse of its size; those of none are not used."""
 
     parameter: Ints
@@ -153,7 +153,7 @@ def _weighted(pc: Array, white: Array, count: int, out: Array) -> None:
 
 
 @inner
-def _differences(x: Array, steps: Steps, out: Array) -> None:
+def _differences(x: Array, steps: SmallSteps, out: Array) -> None:
     """Derivatives (n, m, parameters) by the differences of lanes (n, m, steps) from the first one."""
     for i in range(x.shape[0]):
         for j in range(x.shape[1]):
@@ -166,7 +166,7 @@ def _gains(
     p: Array,
     own: CornerLanes,
     at: int,
-    steps: Steps,
+    steps: SmallSteps,
     logdet: Array,
     k_gain: Array,
     slopes: CornerSlopes,
@@ -220,7 +220,7 @@ def corner_gains(
     corner_rad2: Array,
     uncertain: NDArray[np.bool_],
     decides: bool,
-    steps: Steps,
+    steps: SmallSteps,
     slopes: CornerSlopes,
     more: Array,
 ) -> None:
@@ -257,4 +257,4 @@ def corner_gains(
             _predicted(p, k_gain, own, at, corner_rad2, k + 1)
 
 
-__all__ = ["CornerLanes", "CornerSlopes", "Steps", "corner_gains"]
+__all__ = ["CornerLanes", "CornerSlopes", "SmallSteps", "corner_gains"]

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.tracing.model.corner_lanes import CornerLanes, CornerSlopes, Steps, corner_gains
+from airtruth.tracing.model.corner_lanes import CornerLanes, CornerSlopes, SmallSteps, corner_gains
 from airtruth.tracing.model.gain_slopes import Conditions, Moves
 from airtruth.tracing.model.linearise import FirstUpdate
 from airtruth.tracing.model.sensor_slopes import GainSlopes, width_of
@@ -61,7 +61,10 @@ def slopes_along(
     if lower.size or corner_rad2.size:
         node = lower + (share > 0.5) if lower.size else np.zeros(samples, dtype=np.int64)
         recursion = partial(corner_gains, node=node, lower=lower, share=share, corner_rad2=corner_rad2)
-        uncertain, own_steps = np.zeros(samples, dtype=np.bool_), Steps(moved - 1, np.append(0.0, 1.0 / h))
+        uncertain, own_steps = (
+            np.zeros(samples, dtype=np.bool_),
+            SmallSteps(moved - 1, np.append(0.0, 1.0 / h)),
+        )
         part = _each(lambda x: np.zeros((0, *x.shape[1:])), slopes)
         none = CornerLanes._make(x if x is own.covariance else np.ascontiguousarray(x[..., :1]) for x in own)
         recursion(none, uncertain=uncertain, decides=True, steps=own_steps, slopes=part, more=np.zeros(1))

@@ -17,8 +17,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.aircraft.probe import Constants
 from airtruth.physics.lateral import places
 from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion_parts import reference_length_m
 from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.probe_lateral import lateral_forces
 from airtruth.tracing.model.plant import FLOW, Plant, looked_up
@@ -30,14 +32,14 @@ _FRAMES: Final = 50
 """Frames of JSBSim for which filters and engines settle in one state [-] (`airtruth.simulation.probe`)."""
 
 
-def along_record(s: Signals, span_m: float) -> Array:
+def along_record(s: Signals, constants: Constants) -> Array:
     """(signals, samples) of the motion along a run [rad, -]."""
-    half = span_m / (2.0 * s.airspeed_m_s[:: s.sub])
     outputs = [LATERAL.output_channels.index(x.channel) for x in LATERAL.states]
     rows = []
     for signal, (is_state, number) in zip(LATERAL.signals, places(LATERAL), strict=True):
         own = s.y[:, outputs[number]] if is_state else s.sampled_controls_rad[number]
-        rows.append(own if signal.length is None else own * half)
+        length = reference_length_m(constants, signal.length)
+        rows.append(own if signal.length is None else own * (length / (2.0 * s.airspeed_m_s[:: s.sub])))
     return np.stack(rows)
 
 
@@ -58,11 +60,11 @@ def _beyond_tables(s: Signals, plant: Plant) -> Array | None:
     if at is None:
         return None
     alpha = s.alpha_rad[:: s.sub]
-    along = along_record(s, c.span_m).T
+    along = along_record(s, c).T
     points, _ = plant.stacked
     inside = np.clip(along, points[:, 0], points[:, -1])
-    to_rate = 2.0 * at.airspeed_m_s / c.span_m
-    states = inside * np.array([1.0 if x.length is None else to_rate for x in LATERAL.signals])
+    lengths = [None if x.length is None else reference_length_m(c, x.length) for x in LATERAL.signals]
+    states = inside * np.array([1.0 if x is None else 2.0 * at.airspeed_m_s / x for x in lengths])
     flown = isolated_flight(
         _FRAMES * len(states),
         f"the lateral forces of {plant.aircraft.name}",
@@ -75,7 +77,7 @@ def _beyond_tables(s: Signals, plant: Plant) -> Array | None:
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
     known = dict(zip((x.name for x in LATERAL.signals), inside.T, strict=True))
     tables = looked_up(plant, known | {FLOW: alpha}, np.full(len(alpha), pressure))
-    scale = np.array([1.0 if x.length is None else c.span_m for x in LATERAL.coefficients])
+    scale = np.array([reference_length_m(c, x.length) for x in LATERAL.coefficients])
     found = (flown - tables) / (pressure * c.wing_area_m2 * scale)
     grid = np.arange((len(alpha) - 1) * s.sub + 1) / s.sub
     return np.stack([np.interp(grid, np.arange(len(alpha)), row) for row in found.T])

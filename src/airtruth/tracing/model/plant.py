@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.motion_parts import reference_length_m
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.probe import alpha_dot_terms
@@ -238,8 +239,7 @@ def linear(
     """
     c = aircraft.constants
     names = [signal.name for signal in motion.signals]
-    lengths = {None: 1.0, "chord": c.chord_m, "span": c.span_m}
-    factors = [x.sign * c.wing_area_m2 * lengths[x.length] for x in motion.coefficients]
+    factors = [x.sign * c.wing_area_m2 * reference_length_m(c, x.length) for x in motion.coefficients]
     moment = np.zeros(FORCES)
     if power is not None:
         moment[-1] = power.constant[-1]

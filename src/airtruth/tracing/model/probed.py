@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import TrimError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.motion_parts import Signal, reference_length_m
 from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.operating_point import lateral_operating_point, operating_point
 from airtruth.simulation.probe import ForceGrid, forces_at_speeds
-from airtruth.simulation.probe_lateral import LateralForceGrid
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.model.declared import declared_covariance
@@ -93,24 +93,24 @@ def probed(
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _MARGIN, _LEAST_RATE[None])
     offset = at.controls.command(ELEVATOR) - at.elevator_rad
     commands = whole(elevator[0] + offset, elevator[1] + offset)
-    grid = ForceGrid(whole(*alpha), commands, rates, np.ones(1))
+    grid = ForceGrid((whole(*alpha), commands, rates), np.ones(1))
     point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, SPEEDS)
     tables, power = point.tables, _engines_of(at, point.at_speeds)
     over_alpha = _lines(at, point.over_alpha)[0]
     constant = power.constant + (
-        over_alpha - over_alpha[int(np.argmin(np.abs(tables.alpha_rad - at.alpha_rad)))]
+        over_alpha - over_alpha[int(np.argmin(np.abs(tables.axes[0] - at.alpha_rad)))]
     )
     values = (tables.values[0] - constant[:, None, None]) / _pressure(at)
-    qhat = tables.q_rad_s * aircraft.constants.chord_m / (2.0 * at.airspeed_m_s)
     (names,) = LAYOUTS[LONGITUDINAL.name]
+    *angles, rate = tables.axes
+    signals = {signal.name: signal for signal in LONGITUDINAL.signals}
+    rate = rate * reference_length_m(aircraft.constants, signals[names[-1]].length) / (2.0 * at.airspeed_m_s)
     return Plant(
         aircraft=aircraft,
         motion=LONGITUDINAL,
-        tables=(
-            ForceTable(names, (tables.alpha_rad, tables.elevator_rad, qhat), np.ascontiguousarray(values)),
-        ),
+        tables=(ForceTable(names, (*angles, rate), np.ascontiguousarray(values)),),
         constant=constant,
-        trims=dict(zip(names, (at.alpha_rad, at.elevator_rad, 0.0), strict=True)),
+        trims={name: at.of(signals[name].channel) for name in names},
         neutral_rad=np.zeros(len(LONGITUDINAL.controls)),
         derivatives=point.derivatives.central,
         derivative_cov=declared_covariance(aircraft, point.derivatives.central),
@@ -129,18 +129,17 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
     ----------
     reach : signal, the angle of attack among them -> lowest and highest value [rad, -].
     """
-    half = aircraft.constants.span_m / (2.0 * at.airspeed_m_s)
-    factors = [1.0 if s.length is None else half for s in LATERAL.signals]
+    factors = [_to_signal(aircraft, at, signal) for signal in LATERAL.signals]
     axes = tuple(
         _whole(*reach[s.name]) if s.length is None else _rates(*reach[s.name], _LEAST_RATE[s.length]) / half
-        for s in LATERAL.signals
+        for s, half in zip(LATERAL.signals, factors, strict=True)
     )
     point = isolated(
         f"the table of lateral forces of {aircraft.name}",
         lateral_operating_point,
         aircraft,
         at,
-        LateralForceGrid(_whole(*reach[FLOW]), axes, SPEEDS),
+        ForceGrid((_whole(*reach[FLOW]), *axes), SPEEDS),
     )
     tables, derivatives = point.tables, point.derivatives.central
     constant = _lines(at, tables.over_alpha)[0]
@@ -149,14 +148,13 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
         (own - (constant if number == 0 else middle)[:, None]) / _pressure(at)
         for number, own in enumerate(tables.values)
     ]
-    own_axes = [x * f for x, f in zip(tables.signals, factors, strict=True)]
-    surfaces = [at.surfaces_rad[control.name] for control in LATERAL.controls]
-    origin = [at.controls.sideslip_rad, 0.0, 0.0, *surfaces]
+    own_axes = [x * f for x, f in zip(tables.axes[1:], factors, strict=True)]
+    origin = at.origin(LATERAL).tolist()
     return Plant(
         aircraft=aircraft,
         motion=LATERAL,
         tables=tuple(
-            ForceTable(names, (tables.alpha_rad, axis), own)
+            ForceTable(names, (tables.axes[0], axis), own)
             for names, (axis, own) in zip(
                 LAYOUTS[LATERAL.name], _of_one_length(own_axes, values), strict=True
             )
@@ -168,6 +166,12 @@ def probed_lateral(aircraft: Aircraft, at: Trim, reach: Mapping[str, tuple[float
         derivative_cov=declared_covariance(aircraft, derivatives, LATERAL),
         trim=at,
     )
+
+
+def _to_signal(aircraft: Aircraft, at: Trim, signal: Signal) -> float:
+    """Factor from a channel to its signal: 1 for an angle, l/(2V) for a rate."""
+    half = reference_length_m(aircraft.constants, signal.length) / (2.0 * at.airspeed_m_s)
+    return 1.0 if signal.length is None else half
 
 
 def engines(aircraft: Aircraft, at: Trim) -> Engines:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.motion_parts import reference_length_m
 from airtruth.physics.terms import AeroTerm
 from airtruth.tracing.model.plant import FORCES, Plant
 from airtruth.tracing.model.records import TraceRecord
@@ -72,9 +73,11 @@ def curve_of(record: TraceRecord, term: AeroTerm) -> Curve:
 def _coefficient(forces: Array, plant: Plant, name: str) -> Array:
     """A coefficient of the body axes of forces over the dynamic pressure (points, 3); one that is none of the motion is CX."""
     c, motion = plant.aircraft.constants, plant.motion
-    lengths = {None: 1.0, "chord": c.chord_m, "span": c.span_m}
     first = FORCES - len(motion.coefficients)
-    rows = {x.name: (first + row, x.sign * lengths[x.length]) for row, x in enumerate(motion.coefficients)}
+    rows = {
+        x.name: (first + row, x.sign * reference_length_m(c, x.length))
+        for row, x in enumerate(motion.coefficients)
+    }
     row, factor = rows.get(name, (0, 1.0))
     return np.asarray(forces[:, row] / (c.wing_area_m2 * factor))
 
