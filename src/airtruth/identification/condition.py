@@ -217,17 +217,17 @@ def divide(
         moment: x alpha [rad], q/p [rad/s], -x' alpha - x q - g cos(gamma)/(V0 p) [rad/s], -(1/p)' q [rad/s2], with
         x = v/p and alpha relative to its mean.
     """
-    by_lift, by_moment = v / p, 1.0 / p
+    alpha_factor, q_factor = v / p, 1.0 / p
     alpha = signals[:, ALPHA] - signals[:, ALPHA].mean(axis=1, keepdims=True)
     q = signals[:, Q].copy()
     signals[:, Q] /= v
     signals[:, AZ] /= p
-    slope_lift, slope_moment = (np.gradient(x, dt_s, axis=1) for x in (by_lift, by_moment))
-    added = -slope_lift * alpha - by_lift * q - G0 / airspeed_m_s[:, None] * across * by_moment
-    left = np.stack([by_lift * alpha, by_moment * q, added, -slope_moment * q], axis=1)
+    alpha_slope, q_slope = (np.gradient(x, dt_s, axis=1) for x in (alpha_factor, q_factor))
+    added = -alpha_slope * alpha - alpha_factor * q - G0 / airspeed_m_s[:, None] * across * q_factor
+    left = np.stack([alpha_factor * alpha, q_factor * q, added, -q_slope * q], axis=1)
     if lateral is not None:
-        left[:, 2] -= by_lift * lateral[0]
-        left[:, 3] -= by_moment * lateral[1]
+        left[:, 2] -= alpha_factor * lateral[0]
+        left[:, 3] -= q_factor * lateral[1]
     return left
 
 
