@@ -395,6 +395,20 @@ def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance(rota
     assert np.abs(correlation).max() < 5.0 / np.sqrt(len(values))
 
 
+def test_the_share_of_the_roll_gust_begins_at_none():
+    """The variance of p is even in the share, so that shares below none are those above it a second time."""
+    record = lr.record(np.zeros((50, 5)), 0.0, 0.0)
+    own = lr.per_record(level=0.8)
+    shares = (-0.2, 0.0, 0.2)
+    below, none, above = (
+        lr.responded(record, common_=lr.common(rotary=s - 0.5), own=own).covariance[1, 1] for s in shares
+    )
+    assert below - none == pytest.approx(above - none, rel=0.1)
+    assert above > 1.05 * none
+    common = lr.LAYOUT.common
+    assert common.bounds[common.rotary][0] == -0.5
+
+
 def test_the_roll_gust_is_driven_and_scaled_as_it_is_flown():
     given, kernel = lr.kernel(made(), common_=lr.common(rotary=0.5), own=lr.per_record(level=0.8))
     process = process_intensity(lr.V, kernel.model)

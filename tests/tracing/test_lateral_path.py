@@ -4,14 +4,20 @@ from dataclasses import replace
 
 import lateral_records as lr
 import numpy as np
+import pytest
 
+from airtruth import aircraft
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.terms import Change
+from airtruth.tracing import TraceOptions
+from airtruth.tracing.inference.assess import assess
 from airtruth.tracing.model.reading import read
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import filter_inputs, kernel_input
+from airtruth.tracing.prepare import prepare
 from airtruth.units import DEG
-from validation import lateral_truth
+from validation import damage, lateral_truth
+from validation.lateral_declared import lateral_aircraft
 from validation.lateral_truth import GTM, Flight, log_of
 
 FLIGHT = Flight(duration_s=10.0, seed=3).quiet()
@@ -65,3 +71,19 @@ def test_a_gust_along_the_body_is_a_tailwind_of_the_record(monkeypatch):
         for tailwind in (0.0, share / (1.0 - share))
     }
     assert error[share / (1.0 - share)] < 0.3 * error[0.0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [6401701, 6401703])
+def test_a_record_that_no_fit_has_seen_has_white_innovations(tmp_path, seed):
+    """Its own parameters are known as little as in a held-out record; a weak fin makes the motion large."""
+    case = damage.CASES["fin-30"]
+    plane = aircraft.load(lateral_aircraft(tmp_path / "gtm", case.plane))
+    made = prepare([log_of(*damage.flights(case, seed)[:4])], plane, [], TraceOptions(motion="lateral"))
+    entries = made.fitted.layout.common
+    common = np.zeros(entries.size)
+    common[[entries.rotary, entries.rolloff]] = -0.5  # Dryden gusts without rotary parts
+    for problem in (made.fitted, made.held):
+        for i in range(len(problem.records)):
+            white = assess(problem, i, made.hypothesis, common, np.zeros(0)).whitened
+            assert (white**2).mean() == pytest.approx(1.0, abs=0.1)

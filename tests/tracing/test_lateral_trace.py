@@ -84,6 +84,19 @@ def test_a_weak_fin_is_named(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("left", [0.0, 0.2])
+def test_a_lost_rudder_is_named_although_the_derivatives_can_absorb_it(tmp_path, left):
+    lateral = GTM.lateral.copy()
+    lateral[:, 4] *= left
+    case = damaged.Damage(replace(GTM, lateral=lateral), ("rudder_effectiveness",))
+    log = log_of(*damaged.flights(case, seed=8)[:4])
+    answer = trace([log], lateral_aircraft(tmp_path / "gtm"), replace(LATERAL, increments=False)).answer
+    (effect,) = answer.effects
+    assert effect.key == "rudder_effectiveness"
+    assert effect.parameters["factor"].value == pytest.approx(left, abs=0.1)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "key"), [("tip-20", "wing_tip_loss"), ("cg-side-3", "cg_shift_y")])
 def test_an_asymmetric_aircraft_has_one_cause_that_predicts_other_records(tmp_path, case, key):
     """Both roll the aircraft with its lift, which follows the gusts; the yaw of the CG tells them apart."""

@@ -37,14 +37,15 @@ def _effectiveness(control: str) -> Effect:
     return Effect(
         name=f"{control}_effectiveness",
         where="declared",
-        parameters=(factor(f"on the forces and moments of the {control}", 0.0, 2.0, 0.05),),
+        parameters=(factor(f"on the forces and moments of the {control}", -0.2, 2.0, 0.05),),
         describe=_change(control, "factor"),
         explanation=f"The {control} is more or less effective than declared: a part or all of it is lost, a gap, "
         "an error of gearing.",
         source=f"Forces and moments of the {control} times factor; written as deflection times factor, exact where they "
-        f"are linear in it. Material: 5 %, the usual uncertainty of a wind-tunnel {first}.",
+        f"are linear in it. The range has room for the estimate of a lost surface on both sides of zero. Material: 5 %, the "
+        f"usual uncertainty of a wind-tunnel {first}.",
         distinguished_by=f"It is known only as accurately as {first} and {second} are declared.",
-        prior=Prior(0.3, -1.0, 1.0),
+        prior=Prior(0.3, -1.2, 1.0),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from airtruth.numerics.levenberg_marquardt import minimise
 from airtruth.numerics.levenberg_marquardt_options import Damping, SolverOptions, Stopping
 from airtruth.numerics.normal_equations import scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import ROUGH_M_S
 from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import CompiledChange
@@ -39,6 +40,8 @@ promises less than 0.05. Derivatives that serve several steps end it early, by h
 knowledge of the gusts."""
 _MOST_LOG_STEP: Final = 1.0
 """Largest step of the logarithm of the gust level [-]: a factor of e (judgement)."""
+_HELD: Final = 1e-6
+"""Prior standard deviation that holds gusts [rad, -]; judgement: far less than the records show."""
 _FREE_RUN_ITERATIONS: Final = 3
 """Most Gauss-Newton iterations of a free run [-]; judgement: the simulation is nearly linear in what is free."""
 _FREE_RUN_GAIN: Final = 1e-3
@@ -185,13 +188,24 @@ def _fit_own(
     sizes: Array,
     start: Array | None,
 ) -> Array:
-    """Own parameters of one record at their best, all else given; it begins at `initial_per_record` without a start."""
+    """Own parameters of one record at their best, all else given; it begins at `initial_per_record` without a start.
+
+    A mean gust that no fit has estimated is held first, and the level with it, in rough air: it multiplies the motion, which is
+    not known yet.
+    """
     record, settings = problem.records[index], problem.settings
     alone = TraceProblem((record,), settings)
-    if start is None:
-        start = initial_per_record(record, settings)
     ((mean, precision),) = alone.priors(hypothesis).per_record
     search = _OwnSearch(alone, hypothesis, common, sizes, mean, precision)
+    if start is None:
+        start = initial_per_record(record, settings)
+    gust, level = settings.layout.per_record.mean_gust, settings.layout.per_record.log_gust
+    if start[gust].size and not start[gust].any():
+        rough, held = start.copy(), precision.copy()
+        rough[level] = np.log(ROUGH_M_S)
+        for i in (level, *range(gust.start, gust.stop)):
+            held[i, i] = _HELD**-2.0
+        start = minimise(replace(search, mean=rough, precision=held), rough[None, :], _SEARCH).x[0]
     return np.asarray(minimise(search, start[None, :], _SEARCH).x[0])
 
 

@@ -56,7 +56,7 @@ _SEARCH: Final = SolverOptions(
 estimates by 0.06 standard errors, one of 0.05 by 0.3. The last 0.5 is for tables with breaks, which give the gain of
 the filter, and with it the cost, small breaks too. Derivatives cost six times what a trial costs, so that they serve
 until they gain less than 1, or less than half of what they promise."""
-_ROUGH_M_S: Final = 1.0
+ROUGH_M_S: Final = 1.0
 """Gust level in which a search starts where nothing is known [m/s]: the records then weigh little and no start is far
 (judgement)."""
 _MOST_LOG_STEP: Final = 1.0
@@ -259,7 +259,7 @@ def initial_parameters(
     sizes : where those of the effects start; None for zero.
     """
     own = np.stack([initial_per_record(record, problem.settings) for record in problem.records])
-    own[:, problem.layout.per_record.log_gust] = np.log(_ROUGH_M_S)
+    own[:, problem.layout.per_record.log_gust] = np.log(ROUGH_M_S)
     first = np.zeros(len(hypothesis.parameters)) if sizes is None else sizes
     point = Parameters(np.zeros(problem.layout.common.size), own, first, problem.layout)
     priors = problem.priors(hypothesis)
@@ -297,4 +297,4 @@ def _covariance(search: PosteriorSearch, at: Evaluated, point: Parameters) -> Ar
     return scaled_inverse(marginal.information, _RIDGE)
 
 
-__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "fit", "initial_parameters"]
+__all__ = ["ITERATIONS", "ROUGH_M_S", "Evaluated", "PosteriorSearch", "fit", "initial_parameters"]

@@ -79,7 +79,9 @@ class _BestFirst:
         declared: DeclaredCauses,
         advance: Advance,
     ) -> None:
-        held = {e.key for e in effects}
+        # derivatives that have absorbed a lost surface leave its effect nothing to scale: it is a cause of theirs too
+        scaled = {control.name for control in null.hypothesis.motion.controls}
+        held = {e.key for e in effects if e.quantity not in scaled}
         self.sets, self.null, self.hypothesis = sets, null, null.hypothesis
         self.effects, self.advance = effects, advance
         self.causes = tuple(c for c in declared.causes if c.key not in held)
