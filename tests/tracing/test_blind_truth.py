@@ -169,7 +169,8 @@ def test_the_truth_without_draws_is_the_declared_aircraft(gtm, paper_trim):
     t = np.arange(len(seen)) * STEP_S
     air = np.array([1.5 * np.sin(1.3 * t), np.sin(3.0 * t), 0.05 * np.sin(5.0 * t)])
     own = truth.fly(seen, air)
-    inputs = Inputs(seen[::5], *air[:, ::5], surface=True)
+    along, down, rotation = air[:, ::5]
+    inputs = Inputs(seen[::5], along, down, {"q_rad_s": rotation}, surface=True)
     house = Flight(gtm, paper_trim, 0.005).fly(inputs)
     for name in ("alpha_rad", "q_rad_s", "az_m_s2", "airspeed_m_s"):
         theirs, ours = house[name], own[name][::5][: len(house[name])]
