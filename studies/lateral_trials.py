@@ -15,6 +15,7 @@ from pathlib import Path
 
 from airtruth.tracing import TraceOptions
 from airtruth.tracing.answer import TraceAnswer
+from airtruth.tracing.criterion import CRITERION
 from airtruth.tracing.run import trace
 from validation.lateral_declared import lateral_aircraft
 from validation.lateral_truth import MODES, log_of, trial
@@ -32,10 +33,11 @@ def described(answer: TraceAnswer) -> str:
 
 
 def is_reported(answer: TraceAnswer, key: str) -> bool:
-    """Whether a cause is among the sets of the answer."""
+    """Whether a cause is among the effects of the answer, their look-alikes, and the sets within odds of one in twenty."""
     names = {key, key.partition(":")[0]}
     sets = [{e.key, e.name, *e.indistinguishable_from} for e in answer.effects]
-    weighed = [set(alternative.effects) for alternative in answer.alternatives]
+    least = CRITERION.level * max((a.weight for a in answer.alternatives), default=0.0)
+    weighed = [set(a.effects) for a in answer.alternatives if a.weight > least]
     return any(names & one for one in (*sets, *weighed))
 
 
