@@ -10,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airtruth import aircraft
+from airtruth.aircraft.model import LateralProperties
 from airtruth.errors import ConfigurationError, TrimError
 from airtruth.physics.motion import LATERAL
 from airtruth.simulation.attitude import straight_attitude
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.lateral_feedback import LateralFeedback
 from airtruth.simulation.linearise import linearise
-from airtruth.simulation.simulator import Condition, Executive
+from airtruth.simulation.simulator import Condition, Controls, Executive
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG, FT, KT
 from scripts import gtm_model
@@ -47,6 +48,16 @@ def state_of(gtm, at, names):
     executive = Executive(gtm, 1.0 / 200.0)
     executive.initialise(at.condition, at.controls)
     return [executive.fdm[name] for name in names]
+
+
+def test_commands_in_six_axes_take_the_place_of_those_that_hold_the_aircraft_straight(gtm, paper_condition):
+    """The properties of both are the same in the models of most propeller aircraft."""
+    model = gtm.file.jsbsim
+    held = LateralProperties(aileron=model.aileron.command, rudder=model.rudder.command)
+    file = gtm.file.model_copy(update={"jsbsim": model.model_copy(update={"lateral": held})})
+    executive = Executive(gtm.model_copy(update={"file": file}), 1.0 / 200.0)
+    executive.initialise(replace(paper_condition, straight="wings-level"), Controls(0.3, {"aileron": 0.02}))
+    assert executive.fdm[model.aileron.command] == pytest.approx(0.02 * model.aileron.command_per_rad)
 
 
 def test_the_model_holds_the_tables_of_the_folder():

@@ -268,12 +268,13 @@ class Executive:
 
     def hold(self, controls: Controls) -> None:
         """Write the controls, the throttle's trim included."""
+        for control, name in self.model.lateral or ():
+            self.fdm[name] = controls.held.get(control, 0.0)
+        # in six axes the commands of the surfaces take the place of those that hold the aircraft straight
         for name, surface in self.surfaces.items():
             self.fdm[surface.command] = controls.command(name) * surface.command_per_rad
         for name in (*self.model.throttle.command, *self.model.throttle.trim):
             self.fdm[name] = controls.throttle
-        for control, name in self.model.lateral or ():
-            self.fdm[name] = controls.held.get(control, 0.0)
 
     def change_controls(self, controls: Controls, engines_s: float) -> None:
         """Write other controls in the present state, and let filters and engines follow for a time [s]."""
