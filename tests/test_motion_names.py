@@ -31,7 +31,7 @@ CAPS: dict[str, int] = {
     "cli": 16,
     "design": 49,
     "exporting": 0,
-    "identification": 230,
+    "identification": 218,
     "importers": 74,
     "logs": 2,
     "loop": 1,
