@@ -146,6 +146,8 @@ LATERAL: Final = tuple(s.name for s in _LATERAL)
 """Channels of the lateral-directional motion; every log may lack all of them."""
 ATTITUDE: Final = ("theta_rad", "phi_rad", "psi_rad")
 """Angles of the attitude."""
+BANK: Final = ATTITUDE[1]
+"""Bank angle."""
 
 RUN_ID: Final = "run_id"
 """Column with the name of the run."""

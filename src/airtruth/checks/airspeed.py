@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import ATTITUDE
+from airtruth.channels import BANK
 from airtruth.numerics.local_level import smoothed, walk_to_noise
 from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
@@ -32,7 +32,7 @@ _GROUND_SLOPE_M_S2: Final = 0.3
 def low_passed(x: Array, dt_s: float, cutoff_hz: float = _CUTOFF_HZ) -> Array:
     """Samples without what is above a cutoff [Hz], without lag; as they are where the log is too slow or short for it."""
     x = np.asarray(x, dtype=np.float64)
-    if 0.45 / dt_s <= cutoff_hz:
+    if 0.45 / dt_s <= cutoff_hz or len(x) < 40:
         return x
     sos = butterworth(cutoff_hz, 2, dt_s)
     return zero_phase(x[None], sos)[0] if len(x) > edge_samples(sos) else x
@@ -206,7 +206,7 @@ def _banked_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
 
     Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1 (V').
     """
-    alpha, beta, phi = channels[LONGITUDINAL.vane], channels[LATERAL.vane], channels[ATTITUDE[1]]
+    alpha, beta, phi = channels[LONGITUDINAL.vane], channels[LATERAL.vane], channels[BANK]
     along = np.stack([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     gravity = np.stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
     total = G0 * (along * gravity).sum(axis=0)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.channels import ATTITUDE
+from airtruth.channels import BANK
 from airtruth.checks.evidence_lateral import lateral
 from airtruth.checks.excitation import LEAST_TURN_RAD, moves, swing
 from airtruth.checks.factors import (
@@ -45,7 +45,6 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
-_, BANK, _ = ATTITUDE
 
 
 def relations(runs: Runs, aircraft: Aircraft | None = None) -> list[Relation]:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import ATTITUDE
+from airtruth.channels import BANK
 from airtruth.checks.together import Runs
 from airtruth.numerics.whiteness import is_white
 from airtruth.physics.motion import LATERAL
@@ -35,7 +35,7 @@ def turns(channels: Mapping[str, Array], dt_s: float) -> NDArray[np.bool_]:
     dt_s : sample period [s].
     """
     signals = [np.cumsum(channels[n], axis=1) * dt_s for n in LATERAL.gyros if n in channels]
-    signals += [np.unwrap(channels[n], axis=1) for n in ATTITUDE[1:2] if n in channels]
+    signals += [np.unwrap(channels[n], axis=1) for n in (BANK,) if n in channels]
     if not signals:
         return np.zeros(0, dtype=np.bool_)
     return np.asarray(np.any([swing(x) > LEAST_TURN_RAD for x in signals], axis=0))

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import ATTITUDE as ATTITUDES
+from airtruth.channels import BANK
 from airtruth.checks.kinematics_findings import bias_of, concluded, drift, errors_of
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, LongitudinalSamples, thinned
@@ -30,7 +30,7 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-ROTATION: Final = (*LATERAL.gyros, ATTITUDES[1], LATERAL.vane)
+ROTATION: Final = (*LATERAL.gyros, BANK, LATERAL.vane)
 """Channels without one of which the wings count as level."""
 AIRSPEED: Final = ("sensor_delay:airspeed_m_s", "airspeed_alpha_slope")
 """Errors that the equation of airspeed shows."""

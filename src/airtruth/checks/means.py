@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import ATTITUDE, SIGNALS
+from airtruth.channels import BANK, SIGNALS
 from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite, informed_everywhere
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
@@ -134,7 +134,7 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
             return np.stack([c[_AZ].mean(axis=1), gravity, np.zeros_like(speed)], axis=1)
         alpha = c[_ALPHA]
         path = theta - alpha if theta is not None else np.zeros_like(alpha)
-        phi = c.get(ATTITUDE[1])
+        phi = c.get(BANK)
         upright = np.cos(path) if phi is None else np.cos(path) * np.cos(phi)
         turn, turn_std = _slope(alpha, dt_s)
         pitch, gyro_std = (

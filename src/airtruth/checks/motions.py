@@ -117,16 +117,13 @@ def check_motions(
     parts = [one.log for one in admitted]
     remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
     forced = tuple(sentence for one in admitted for sentence in one.forced)
-    doubts = poor.words([one for log in parts for batch in batches(log) for one in poor.measured(batch)])
-    found = {one: _check(one, parts, aircraft) for one in chosen(parts, motion)}
-    return {
-        one.name: replace(
-            result,
-            sentences=(*(doubts if one is LONGITUDINAL else ()), *result.sentences, *remarks),
-            forced=forced,
-        )
-        for one, result in found.items()
-    }
+    found = {}
+    for one in chosen(parts, motion):
+        result = _check(one, parts, aircraft)
+        pitching = [batch for log in parts for batch in batches(log)] if one is LONGITUDINAL else []
+        doubts = poor.words([run for batch in pitching for run in poor.measured(batch)])
+        found[one.name] = replace(result, sentences=(*doubts, *result.sentences, *remarks), forced=forced)
+    return found
 
 
 def _check(motion: Motion, logs: Sequence[FlightLog], aircraft: Aircraft | None) -> CheckResult:

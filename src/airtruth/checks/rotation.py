@@ -20,7 +20,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import ATTITUDE
+from airtruth.channels import BANK
 from airtruth.checks.spectra import integral
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import G0
@@ -28,7 +28,6 @@ from airtruth.units import G0
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
 (_PITCH,), (_ROLL, _YAW) = LONGITUDINAL.gyros, LATERAL.gyros
-_, _BANK, _ = ATTITUDE
 
 
 def bank_coupling(q: Array, r: Array, phi: Array, theta: Array) -> Array:
@@ -73,7 +72,7 @@ def given(c: Channels, name: str) -> Array:
 
 def rates(c: Channels) -> tuple[Array, Array, Array, Array, Array]:
     """p, q, r, phi, theta of a log with roll and yaw; zero where the log has none."""
-    p, q, r, phi, theta = (given(c, n) for n in (_ROLL, _PITCH, _YAW, _BANK, "theta_rad"))
+    p, q, r, phi, theta = (given(c, n) for n in (_ROLL, _PITCH, _YAW, BANK, "theta_rad"))
     return p, q, r, phi, theta
 
 
@@ -81,9 +80,9 @@ def pitched(c: Channels, dt_s: float) -> Array:
     """Change of pitch attitude by the rates [rad]; wings level where no bank is known."""
     q = c[_PITCH]
     turned = integral(q, dt_s)
-    if _BANK not in c or _YAW not in c:
+    if BANK not in c or _YAW not in c:
         return turned
-    return turned + integral(pitch_coupling(q, c[_YAW], c[_BANK]), dt_s)
+    return turned + integral(pitch_coupling(q, c[_YAW], c[BANK]), dt_s)
 
 
 def banked(c: Channels, dt_s: float) -> Array:

@@ -46,47 +46,69 @@ def _shift(name: str, reach: float, material: float) -> Parameter:
 
 
 def _tip(side: str, variant: str) -> Effect:
-    return Effect(
-        name="wing_tip_loss",
-        variant=variant,
-        where="declared",
-        parameters=(_lost(f"part of the {side} semispan that is lost", 0.5, 0.02),),
-        describe=_caused(f"{side}_wing_tip", "fraction"),
-        explanation=f"The {side} wing tip is lost: roll damping and dihedral effect fall, the {side} aileron with them, the "
-        "aircraft rolls to that side at rest, and the CG moves away from it.",
-        source=f"Strip theory; {_LATERAL}, section 5.7. Taper, ailerons and mass of the wing are those of [wing] in "
-        "aircraft.toml. Exact for a fifth of the semispan, linear in the loss. Material: 2 % of the semispan, a change of "
-        "Clp by 3 %.",
-        distinguished_by="Roll damping falls with the aileron; aileron_effectiveness leaves Clp as it is. The rolling moment "
-        "at rest grows with the lift.",
-        in_derivatives=True,
-        prior=Prior(0.15, 0.0, 0.5, shape=0.3, log_odds=-6.0),
+    return _lost(
+        "wing_tip",
+        side,
+        variant,
+        ("semispan", 0.5, 0.02),
+        (
+            f"The {side} wing tip is lost: roll damping and dihedral effect fall, the {side} aileron with them, the "
+            "aircraft rolls to that side at rest, and the CG moves away from it.",
+            f"Strip theory; {_LATERAL}, section 5.7. Taper, ailerons and mass of the wing are those of [wing] in "
+            "aircraft.toml. Exact for a fifth of the semispan, linear in the loss. Material: 2 % of the semispan, a change of "
+            "Clp by 3 %.",
+            "Roll damping falls with the aileron; aileron_effectiveness leaves Clp as it is. The rolling moment "
+            "at rest grows with the lift.",
+        ),
+        0.15,
     )
 
 
 def _flap(side: str, variant: str) -> Effect:
-    return Effect(
-        name="flap_loss",
-        variant=variant,
-        where="declared",
-        parameters=(_lost(f"part of the {side} trailing-edge flap that is lost", 1.0, 0.1),),
-        describe=_caused(f"{side}_flap", "fraction"),
-        explanation=f"The {side} trailing-edge flap is lost: the aircraft rolls to that side with its lift, and roll damping and "
-        "dihedral effect fall a little.",
-        source=f"Strip theory with the chord that is lost; {_LATERAL}, section 5.7. Ends and chord of the flaps, taper and mass "
-        "of the wing are those of [wing] in aircraft.toml. Material: a tenth of a flap, a rolling moment that half a degree of "
-        "the GTM's aileron balances.",
-        distinguished_by="The aileron keeps its effectiveness, and roll damping loses two fifths of what it loses with a wing "
-        "tip of the same rolling moment. cg_shift_y yaws the aircraft too.",
-        in_derivatives=True,
-        prior=Prior(0.5, 0.0, 1.0, shape=0.3, log_odds=-6.0),
+    return _lost(
+        "flap",
+        side,
+        variant,
+        ("trailing-edge flap", 1.0, 0.1),
+        (
+            f"The {side} trailing-edge flap is lost: the aircraft rolls to that side with its lift, and roll damping and "
+            "dihedral effect fall a little.",
+            f"Strip theory with the chord that is lost; {_LATERAL}, section 5.7. Ends and chord of the flaps, taper and mass "
+            "of the wing are those of [wing] in aircraft.toml. Material: a tenth of a flap, a rolling moment that half a degree "
+            "of the GTM's aileron balances.",
+            "The aileron keeps its effectiveness, and roll damping loses two fifths of what it loses with a wing "
+            "tip of the same rolling moment. cg_shift_y yaws the aircraft too.",
+        ),
+        0.5,
     )
 
 
-def _lost(meaning: str, most: float, material: float) -> Parameter:
-    """The part of something that is lost, ``fraction``."""
-    return Parameter(
+def _lost(
+    part: str,
+    side: str,
+    variant: str,
+    lost: tuple[str, float, float],
+    words: tuple[str, str, str],
+    std: float,
+) -> Effect:
+    """The loss of a part of one half of the wing: of what a fraction is lost, the most, and the material one."""
+    whole, most, material = lost
+    explanation, source, distinguished_by = words
+    meaning = f"part of the {side} {whole} that is lost"
+    fraction = Parameter(
         "fraction", "-", meaning, low=0.0, high=most, material=material, one_sided=True, step=1e-3
+    )
+    return Effect(
+        name=f"{part}_loss",
+        variant=variant,
+        where="declared",
+        parameters=(fraction,),
+        describe=_caused(f"{side}_{part}", fraction.name),
+        explanation=explanation,
+        source=source,
+        distinguished_by=distinguished_by,
+        in_derivatives=True,
+        prior=Prior(std, 0.0, most, shape=0.3, log_odds=-6.0),
     )
 
 

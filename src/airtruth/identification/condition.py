@@ -190,15 +190,7 @@ def ratios(
     return airspeed_m_s / scale.airspeed_m_s[:, None], force / scale.normal[:, None]
 
 
-def divide(
-    signals: Array,
-    v: Array,
-    p: Array,
-    airspeed_m_s: Array,
-    dt_s: float,
-    across: Array,
-    lateral: tuple[Array, Array] | None = None,
-) -> Array:
+def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float, across: Array) -> Array:
     """Divide q and az of ``signals`` by v and p, in place, and return the left sides.
 
     Parameters
@@ -208,7 +200,6 @@ def divide(
     airspeed_m_s : (runs,) V0.
     dt_s : sample period [s].
     across : (runs, samples) from `across_path`.
-    lateral : parts of alpha' and q' from `lateral_inputs`, which are subtracted; None for none.
 
     Returns
     -------
@@ -224,11 +215,7 @@ def divide(
     signals[:, AZ] /= p
     alpha_slope, q_slope = (np.gradient(x, dt_s, axis=1) for x in (alpha_factor, q_factor))
     added = -alpha_slope * alpha - alpha_factor * q - G0 / airspeed_m_s[:, None] * across * q_factor
-    left = np.stack([alpha_factor * alpha, q_factor * q, added, -q_slope * q], axis=1)
-    if lateral is not None:
-        left[:, 2] -= alpha_factor * lateral[0]
-        left[:, 3] -= q_factor * lateral[1]
-    return left
+    return np.stack([alpha_factor * alpha, q_factor * q, added, -q_slope * q], axis=1)
 
 
 def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Observation:
@@ -240,8 +227,8 @@ def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Obs
     smooth = zero_phase(signals, sos)
     condition = flight_condition(batch, constants, options, smooth[:, Q])
     left = left_smooth = NO_LEFT
-    measured, lateral = options.pressure == "measured", lateral_inputs(batch, constants)
-    rolls = lateral[1].any(axis=1, keepdims=True)
+    measured, (in_alpha, in_q) = options.pressure == "measured", lateral_inputs(batch, constants)
+    rolls = in_q.any(axis=1, keepdims=True)
     if measured or rolls.any():
         across = across_path(batch)
         if measured:
@@ -249,9 +236,9 @@ def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Obs
         else:
             v = p = np.ones_like(across)
             across = np.where(rolls, across, 1.0)
-        left = divide(
-            signals, v, p, condition.airspeed_m_s, batch.dt_s, across, lateral if rolls.any() else None
-        )
+        left = divide(signals, v, p, condition.airspeed_m_s, batch.dt_s, across)
+        left[:, 2] -= v / p * in_alpha
+        left[:, 3] -= in_q / p
         smooth, left_smooth = zero_phase(signals, sos), zero_phase(left, sos)
     return Observation(
         dt_s=batch.dt_s,

@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
+from airtruth.checks.spectra import integral
+from airtruth.identification.record_constants import stated_value
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 
@@ -47,7 +48,7 @@ def lateral_inputs(batch: Batch, constants: object) -> tuple[Array, Array]:
     p, r = c[_P], c[_R]
     q_rate_rad_s2 = ((izz - ixx) * p * r - ixz * (p**2 - r**2)) / iyy
     alpha_rate_rad_s = -(p * np.cos(alpha) + r * np.sin(alpha)) * np.tan(c[LATERAL.vane])
-    caused = cumulative_trapezoid(q_rate_rad_s2, dx=batch.dt_s, axis=1, initial=0.0)
+    caused = integral(q_rate_rad_s2, batch.dt_s)
     # a constant moment is a trim: its integral is a trend
     time = np.linspace(-1.0, 1.0, q.shape[1])
     time /= np.linalg.norm(time)
@@ -57,11 +58,4 @@ def lateral_inputs(batch: Batch, constants: object) -> tuple[Array, Array]:
     return np.where(counts, alpha_rate_rad_s, 0.0), np.where(counts, q_rate_rad_s2, 0.0)
 
 
-def stated_value(constants: object, name: str) -> float:
-    """A constant of an aircraft, or of the table of constants within; 0 where it states none."""
-    within = getattr(constants, "constants", None)
-    value = getattr(constants, name, getattr(within, name, 0.0))
-    return float(value) if value is not None else 0.0
-
-
-__all__ = ["lateral_inputs", "stated_value"]
+__all__ = ["lateral_inputs"]

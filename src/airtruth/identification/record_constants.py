@@ -13,10 +13,9 @@ import numpy as np
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import ConfigurationError, LogError, choices
-from airtruth.identification.condition import AircraftConstants
-from airtruth.identification.lateral_inputs import stated_value
 from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.short_period import PitchConstants
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class EqualRuns:
     """
 
     batch: Batch
-    constants: AircraftConstants
+    constants: PitchConstants
     cg_mac: float | None
 
 
@@ -90,7 +89,7 @@ def stated(metadata: Mapping[str, object], run_id: str) -> dict[str, float]:
     return known
 
 
-def of_run(constants: AircraftConstants, metadata: Mapping[str, object], run_id: str) -> AircraftConstants:
+def of_run(constants: PitchConstants, metadata: Mapping[str, object], run_id: str) -> PitchConstants:
     """The aircraft with the constants that the log states for a run; itself if it states none.
 
     Raises
@@ -111,7 +110,14 @@ def of_run(constants: AircraftConstants, metadata: Mapping[str, object], run_id:
     return kind(**{f.name: known.get(f.name, stated_value(constants, f.name)) for f in fields(kind)})
 
 
-def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> RecordConstants:
+def stated_value(constants: object, name: str) -> float:
+    """A constant of an aircraft, or of the table of constants within; 0 where it states none."""
+    within = getattr(constants, "constants", None)
+    value = getattr(constants, name, getattr(within, name, 0.0))
+    return float(value) if value is not None else 0.0
+
+
+def values_of(constants: PitchConstants, motion: Motion = LONGITUDINAL) -> RecordConstants:
     """The constants that the identification of a motion needs, alone.
 
     Raises
@@ -139,7 +145,7 @@ def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> Re
 
 
 def with_constants(
-    log: FlightLog, constants: AircraftConstants, motion: Motion = LONGITUDINAL
+    log: FlightLog, constants: PitchConstants, motion: Motion = LONGITUDINAL
 ) -> Iterator[EqualRuns]:
     """Batches of a log whose runs share their constants and centre of gravity.
 
@@ -150,7 +156,7 @@ def with_constants(
     """
     for batch in batches(log):
         groups: dict[tuple[float, ...], list[int]] = {}
-        owners: dict[tuple[float, ...], tuple[AircraftConstants, float | None]] = {}
+        owners: dict[tuple[float, ...], tuple[PitchConstants, float | None]] = {}
         for run, run_id in enumerate(batch.run_ids):
             own = of_run(constants, log.metadata, run_id)
             cg = stated(log.metadata, run_id).get(CG)
@@ -191,7 +197,7 @@ def by_loading(parts: Sequence[EqualRuns]) -> dict[float | None, list[EqualRuns]
 
 
 def differing(
-    metadata: Mapping[str, object], run_ids: Sequence[str], constants: AircraftConstants
+    metadata: Mapping[str, object], run_ids: Sequence[str], constants: PitchConstants
 ) -> list[tuple[str, str, float, float]]:
     """(run, name, value of the record, value of the aircraft) where a record states another value."""
     return [

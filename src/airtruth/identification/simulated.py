@@ -20,11 +20,11 @@ from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.declared_sensors import Taken, as_ideal
 from airtruth.identification.estimates import JOINT
 from airtruth.identification.lateral.simulated import simulate as simulate_lateral
-from airtruth.identification.lateral_inputs import stated_value
 from airtruth.identification.record_constants import (
     LateralValues,
     RecordConstants,
     of_run,
+    stated_value,
     values_of,
 )
 from airtruth.logs.flight_log import Batch, FlightLog

@@ -30,9 +30,9 @@ def recursion(pole: complex, driven: Array, before: ArrayLike = 0.0) -> Array | 
     (..., samples) solution, complex with a complex pole.
     """
     samples = driven.shape[-1]
-    if samples == 0:
-        return driven
     right = driven.astype(np.result_type(driven, pole), copy=True)
+    if samples == 0:
+        return right
     right[..., 0] += pole * np.asarray(before)
     band = np.repeat([[1.0], [-pole]], samples, axis=1)
     solved = solve_banded((1, 0), band, right.reshape(-1, samples).T, check_finite=False)

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.model import SurfaceProperties
-from airtruth.channels import SIGNALS
+from airtruth.channels import BANK, SIGNALS
 from airtruth.errors import ConfigurationError, FlightError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.lateral_feedback import FED, LateralFeedback, Loop
 from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
-from airtruth.simulation.simulator import BANK, Executive
+from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import ATTITUDE
+from airtruth.channels import BANK
 from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class LateralFeedback:
     every: int = 1
 
 
-FED: Final = (*LATERAL.gyros, ATTITUDE[1])
+FED: Final = (*LATERAL.gyros, BANK)
 """Channels whose sensors the feedback reads."""
 
 

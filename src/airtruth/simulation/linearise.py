@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.channels import BANK
 from airtruth.errors import TrimError
 from airtruth.physics import short_period
 from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_scale
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.simulation.probe_lateral import FORCES
-from airtruth.simulation.simulator import BANK, Executive
+from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import DEG, FT, PSF
 

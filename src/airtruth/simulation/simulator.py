@@ -17,6 +17,7 @@ import jsbsim
 from airtruth.aircraft import Aircraft, JsbsimModel
 from airtruth.aircraft.model import SurfaceProperties
 from airtruth.aircraft.probe import load_model, model_root
+from airtruth.channels import BANK
 from airtruth.errors import AircraftError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.simulation.attitude import Attitude, straight_attitude
@@ -48,8 +49,6 @@ _RATES: Final = dict(
     )
 )
 """Channel of an angular rate -> its initial condition."""
-(BANK,) = (output.channel for output in LATERAL.outputs if output.instrument == "attitude")
-"""Channel of the bank."""
 STOPS: Final = (jsbsim.BaseError, RuntimeError, KeyError)
 """Exceptions that JSBSim raises on a model or a property."""
 _PLANET: Final = Path(__file__).with_name("flat_planet.xml")

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.channels import BANK
 from airtruth.errors import TrimError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS
-from airtruth.simulation.simulator import BANK, Condition, Controls, Executive, SimulatorResponse
+from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
 from airtruth.units import DEG, FT, KT
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.aircraft.neutral import fitted
 from airtruth.identification import AircraftConstants
 from airtruth.identification.declared_sensors import moved_to_cg
-from airtruth.identification.lateral_inputs import stated_value
+from airtruth.identification.record_constants import stated_value
 from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density

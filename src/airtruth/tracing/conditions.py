@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.channels import ATTITUDE
+from airtruth.channels import BANK
 from airtruth.errors import LogError, TrimError
 from airtruth.physics.gust_figures import gust_scales, side_gust
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
@@ -179,7 +179,7 @@ def _linear_lateral(s: Signals, aircraft: Aircraft, derivatives: Array) -> Plant
     head, c = head_samples(s.dt_s), aircraft.constants
     start = along_record(s, c)[:, :head].mean(axis=1)
     start[[x.length is not None for x in LATERAL.signals]] = 0.0
-    phi = float(s.y[:head, LATERAL.output_channels.index(ATTITUDE[1])].mean())
+    phi = float(s.y[:head, LATERAL.output_channels.index(BANK)].mean())
     side = c.mass_kg * G0 * np.cos(float(s.theta_rad[: head * s.sub].mean())) * np.sin(phi)
     pressure = 0.5 * float(s.density_kg_m3.mean()) * float(np.mean(s.airspeed_m_s**2))
     return linear(aircraft, LATERAL, derivatives, pressure, start, np.array([-side, 0.0, 0.0]))

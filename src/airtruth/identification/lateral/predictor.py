@@ -222,9 +222,9 @@ def records_of(
     attack: float | None = None,
 ) -> Records[LateralScale]:
     """Signals and predictor of a batch, one entry of `records_by_terms`."""
-    return records_by_terms(batch, constants, options, length_m, [options.terms], gusts=gusts, attack=attack)[
-        0
-    ]
+    choices = [options.terms]
+    (made,) = records_by_terms(batch, constants, options, length_m, choices, gusts=gusts, attack=attack)
+    return made
 
 
 def records_by_terms(

@@ -83,7 +83,7 @@ def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) 
         more = products(batch, constants, scale)
         servo = np.zeros_like(more)
         u, bend = np.concatenate([u, more], axis=2), np.concatenate([bend, servo], axis=2)
-        predictor = with_pressure(predictor, scale, batch, constants)
+        predictor = with_pressure(predictor, scale, batch, constants, more.shape[2])
     if options.moment_noise > 0.0:
         noise = (MOMENT_NOISE,)
         predictor = extended(predictor, [Term("Q", "q", "", 1.0, noise * 2)], (), (), noise, noise)

@@ -72,7 +72,7 @@ def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
 
 
 def with_pressure(
-    predictor: Predictor, scale: Scale, batch: Batch, constants: AircraftConstants
+    predictor: Predictor, scale: Scale, batch: Batch, constants: AircraftConstants, count: int
 ) -> Predictor:
     """The predictor of the short period with the inputs that `products` makes.
 
@@ -80,7 +80,7 @@ def with_pressure(
     ----------
     predictor : of `airtruth.identification.likelihood.predictor.short_period`. With airspeed among its outputs the lift of
         the trim follows the gust u; without, it follows the measured airspeed, and u is the part that this does not show.
-    scale, batch, constants : as in `products`.
+    scale, batch, constants : as in `products`; count : number of inputs that it made.
     """
     lift, moment, half, normal = scale.lift, scale.moment, scale.half_chord_time, scale.normal
     terms = [Term("B", "alpha", "gravity", G0 / scale.airspeed_m_s)]
@@ -101,10 +101,11 @@ def with_pressure(
             Term("B", "alpha", "lift_trim", az / scale.airspeed_m_s),
             Term("D", "az", "normal_trim", az),
         ]
-    if not lateral_inputs(batch, constants)[1].any():
-        return extended(predictor, terms, inputs=INPUTS)
-    terms += [Term("B", row, name, 1.0) for row, name in zip(("alpha", "q"), LATERAL_INPUTS, strict=True)]
-    return extended(predictor, terms, inputs=(*INPUTS, *LATERAL_INPUTS))
+    names = (*INPUTS, *LATERAL_INPUTS)[:count]
+    terms += [
+        Term("B", row, name, 1.0) for row, name in zip(("alpha", "q"), names[len(INPUTS) :], strict=False)
+    ]
+    return extended(predictor, terms, inputs=names)
 
 
 def with_trim_moment(predictor: Predictor, scale: Scale) -> Predictor:

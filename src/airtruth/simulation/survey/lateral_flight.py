@@ -9,12 +9,13 @@ from typing import Final
 import numpy as np
 
 from airtruth.aircraft import Aircraft
+from airtruth.channels import BANK
 from airtruth.errors import FlightError, TrimError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import LATERAL_CONTROLS, Manoeuvre, sample
-from airtruth.simulation.simulator import BANK, Straight, jsbsim_model
+from airtruth.simulation.simulator import Straight, jsbsim_model
 from airtruth.simulation.survey.bench import STEP_S
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import allocating, inner
-from airtruth.tracing.model.corners import is_uncertain, settled
+from airtruth.tracing.model.corners import CornerNodes, is_uncertain, settled
 from airtruth.tracing.model.linearise import FirstUpdate
 
 Array = NDArray[np.float64]
@@ -21,23 +21,16 @@ Ints = NDArray[np.int64]
 
 
 class CornerLanes(NamedTuple):
-    """`airtruth.tracing.model.corners.CornerNodes` after each step, (nodes, ..., steps), and the settled filter of each.
+    """The recursion and the settled filter of each flight condition after each step.
 
     Attributes
     ----------
-    variance : (outputs, steps) of the white noise; covariance : (nodes, outputs) variances of the innovations after no step.
-    root : inverse of the steady whitener; scale : the matrix that scales its innovations to the common covariance.
+    corners : (conditions, ..., steps); the variance (outputs, steps).
+    scale : (conditions, outputs, outputs, steps) the matrix that scales settled innovations to the common covariance.
+    k_gain : (conditions, states, outputs, steps) of the settled filter.
     """
 
-    phi: Array
-    noise: Array
-    spread: Array
-    steady: Array
-    c: Array
-    variance: Array
-    covariance: Array
-    root: Array
-    logdet: Array
+    corners: CornerNodes
     scale: Array
     k_gain: Array
 
@@ -84,7 +77,7 @@ def _by_transpose(a: Array, b: Array, out: Array) -> None:
 
 
 @allocating
-def _predicted(p: Array, k_gain: Array, own: CornerLanes, at: int, corner_rad2: Array, sample: int) -> None:
+def _predicted(p: Array, k_gain: Array, own: CornerNodes, at: int, corner_rad2: Array, sample: int) -> None:
     """The covariance of the prediction of a sample from that of the sample before, in place."""
     n, lanes = p.shape[0], p.shape[2]
     read, work = np.empty((k_gain.shape[1], n, lanes)), np.empty((n, n, lanes))
@@ -173,16 +166,16 @@ def _gains(
     place: int,
 ) -> float:
     """Gain of a prediction's covariance; the largest relative distance of that of the innovations from the steady one."""
-    n, lanes, count = p.shape[0], p.shape[2], own.variance.shape[0]
+    corners, n, lanes, count = own.corners, p.shape[0], p.shape[2], own.corners.variance.shape[0]
     pc, s = np.empty((n, count, lanes)), np.empty((count, count, lanes))
     white = np.empty((count, count, lanes))
-    _by_transpose(p, own.c[at], pc)
-    _product(own.c[at], pc, s)
+    _by_transpose(p, corners.c[at], pc)
+    _product(corners.c[at], pc, s)
     away = 0.0
     for i in range(count):
         for r in range(lanes):
-            s[i, i, r] += own.variance[i, r]
-        away = max(away, abs(s[i, i, 0] / own.covariance[at, i] - 1.0))
+            s[i, i, r] += corners.variance[i, r]
+        away = max(away, abs(s[i, i, 0] / corners.covariance[at, i, i, 0] - 1.0))
     _whitener(s, white, logdet)
     _weighted(pc, white, count, k_gain)
     if lanes > 1:
@@ -190,7 +183,7 @@ def _gains(
         scaled, scale = np.empty((count, count, lanes)), np.empty((count, count, lanes))
         _weighted(pc, white, count - 1, early)
         _weighted(s[count - 1 :], white, count - 1, share)
-        _product(own.root[at], white, scaled)
+        _product(corners.root[at], white, scaled)
         _product(own.scale[at], scaled, scale)
         _differences(k_gain, steps, slopes.k_gain[place])
         _differences(early, steps, slopes.first.gain[place])
@@ -232,8 +225,8 @@ def corner_gains(
     uncertain : (samples,) where the gains are not the settled ones, written by the first step if the call ``decides``.
     slopes : a row for each such sample, in their order, or none where no step but the first is given; more : (steps,).
     """
-    samples, count, lanes = node.size, own.variance.shape[0], more.size
-    p, k_gain = own.steady[0].copy(), own.k_gain[0].copy()
+    corners, samples, count, lanes = own.corners, node.size, own.corners.variance.shape[0], more.size
+    p, k_gain = corners.steady[0].copy(), own.k_gain[0].copy()
     scale, logdet = own.scale[0].copy(), np.zeros(lanes)
     place = 0
     for k in range(samples):
@@ -242,7 +235,7 @@ def corner_gains(
             lasts = not settled(_gains(p, own, at, steps, logdet, k_gain, slopes, place))
             place += 1
             for r in range(lanes):
-                more[r] += logdet[r] - own.logdet[at, r]
+                more[r] += logdet[r] - corners.logdet[at, r]
         elif lower.size > 0:
             _between(own.scale, k, lower, share, scale)
         for i in range(count):
@@ -252,9 +245,9 @@ def corner_gains(
             uncertain[k + 1] = lasts or is_uncertain(corner_rad2, k + 1)
         if k + 1 < samples and uncertain[k + 1]:
             if not uncertain[k]:
-                p = own.steady[at].copy()
+                p = corners.steady[at].copy()
                 _between(own.k_gain, k, lower, share, k_gain)
-            _predicted(p, k_gain, own, at, corner_rad2, k + 1)
+            _predicted(p, k_gain, corners, at, corner_rad2, k + 1)
 
 
 __all__ = ["CornerLanes", "CornerSlopes", "SmallSteps", "corner_gains"]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.tracing.model.corner_lanes import CornerLanes, CornerSlopes, SmallSteps, corner_gains
+from airtruth.tracing.model.corners import CornerNodes
 from airtruth.tracing.model.gain_slopes import Conditions, Moves
 from airtruth.tracing.model.linearise import FirstUpdate
 from airtruth.tracing.model.sensor_slopes import GainSlopes, width_of
@@ -66,7 +67,9 @@ def slopes_along(
             SmallSteps(moved - 1, np.append(0.0, 1.0 / h)),
         )
         part = _each(lambda x: np.zeros((0, *x.shape[1:])), slopes)
-        none = CornerLanes._make(x if x is own.covariance else np.ascontiguousarray(x[..., :1]) for x in own)
+        none = CornerLanes(
+            CornerNodes._make(_first(x) for x in own.corners), _first(own.scale), _first(own.k_gain)
+        )
         recursion(none, uncertain=uncertain, decides=True, steps=own_steps, slopes=part, more=np.zeros(1))
         places, total = np.flatnonzero(uncertain), np.zeros(moved.size)
         part = _each(lambda x: np.zeros((places.size, *x.shape[1:])), slopes)
@@ -107,19 +110,23 @@ def _lanes(
     white = np.moveaxis(steps([own.white for own in nodes]), -1, 0)
     scale = np.tril(np.linalg.inv(white[:, common, None]) @ white)
     scale[:, common] = np.eye(white.shape[-1])
-    return CornerLanes(
+    corners = CornerNodes(
         phi=steps([own.phi for own in nodes]),
         noise=steps([own.noise for own in nodes]),
         spread=steps([own.spread for own in nodes]),
         steady=steps([own.steady for own in nodes]),
         c=steps([own.c for own in nodes]),
         variance=np.ascontiguousarray(variance),
-        covariance=np.stack([np.diagonal(own.covariance[0]) for own in nodes]),
+        covariance=steps([own.covariance for own in nodes]),
         root=_last(np.linalg.inv(white)),
         logdet=steps([own.logdet for own in nodes]),
-        scale=_last(scale),
-        k_gain=steps([own.k_gain for own in nodes]),
     )
+    return CornerLanes(corners, _last(scale), steps([own.k_gain for own in nodes]))
+
+
+def _first(x: Array) -> Array:
+    """The first step alone."""
+    return np.ascontiguousarray(x[..., :1])
 
 
 def _last(x: NDArray[np.floating]) -> Array:
