@@ -1,6 +1,7 @@
 """Theme of all figures: readable type, colours that colour-blind readers can tell apart, files written whole.
 
-A ``plot()`` method draws in this way, without pyplot and its global state::
+Matplotlib takes half a second to import, so that the first figure imports it. A ``plot()`` method draws in this way, without
+pyplot and its global state::
 
     @style.themed
     def plot(self) -> Figure:
@@ -19,17 +20,18 @@ import io
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import IO, Any, Final, Literal, ParamSpec, TypeVar
+from typing import IO, TYPE_CHECKING, Any, Final, Literal, ParamSpec, TypeVar
 
-import matplotlib
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from airtruth.errors import StoreError, choices
 from airtruth.logs.atomic import atomic_file
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BLUE: Final = "#0072B2"
 """Blue of Okabe and Ito, Color Universal Design (2008)."""
@@ -106,6 +108,8 @@ T = TypeVar("T")
 
 def applied() -> AbstractContextManager[None]:
     """Return a context in which figures have this theme; matplotlib's settings are restored after it."""
+    import matplotlib
+
     return matplotlib.rc_context(_RC)
 
 
@@ -122,6 +126,8 @@ def themed(draw: Callable[P, T]) -> Callable[P, T]:
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     """Return an empty figure of this size [inch] with constrained layout, outside pyplot's state."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width_in, height_in), layout="constrained", facecolor="white")
 
 

@@ -129,7 +129,7 @@ def test_answer_and_updated_aircraft_are_written(folder, answers, name):
     answer = answers[name]
     assert answer["records"]["held_out"] == ["r3", "r6"]
     assert answer["model"] == "aircraft"
-    assert (folder / "out" / name / "trace.png").stat().st_size > 0
+    assert (folder / "out" / name / "trace.html").stat().st_size > 0
     if answer["effects"]:
         updated = folder / answer["updated_aircraft"]
         assert updated.is_dir()

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import pandas as pd
 
 from airtruth.aircraft import toml
 from airtruth.aircraft.file import FILE, Actuator, Aircraft, AircraftFile
@@ -26,6 +25,9 @@ from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.motion_parts import Control
 from airtruth.quantity import LARGEST, Quantity
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _MOST_ALPHA_RAD: Final = 0.7
 """Largest angle of attack of a trim [rad] (judgement: 40 deg, above any trim; a value in degrees exceeds it)."""

@@ -105,7 +105,7 @@ def trace(
     logs : logs of one aircraft.
     aircraft : the declared aircraft.
     options : choices; None for the defaults.
-    out : folder of trace.json, the figures and the updated aircraft; None to write nothing.
+    out : folder of trace.json, its page and the updated aircraft; None to write nothing.
     force : trace logs that contradict physics; the answer lists the faults. Replace files that this command did not
         write or that changed since.
 
@@ -130,12 +130,13 @@ def trace(
     """
     from airtruth.api.writing import trace_outputs
     from airtruth.arguments import as_path, require_type
+    from airtruth.reporting import draw_traces
     from airtruth.tracing import TraceOptions, trace
 
     require_type("options", options, TraceOptions, "TraceOptions")
     folder = None if out is None else as_path("out", out)
     with trace_outputs("trace", logs, aircraft, folder, force=force) as declared:
-        return trace(logs, declared, options, folder, force)
+        return trace(logs, declared, options, folder, force, draw=draw_traces)
 
 
 def close_loop(

@@ -76,9 +76,11 @@ def perform(task: TraceTask, advance: Callable[[str], None] = lambda step: None)
     """
     with trace_outputs(task.command, task.logs, task.aircraft, task.out, force=task.force) as declared:
         if task.methods is None:
+            from airtruth.reporting import draw_traces
             from airtruth.tracing import trace
 
-            return trace(task.logs, declared, task.options, task.out, task.force, advance).summary()
+            result = trace(task.logs, declared, task.options, task.out, task.force, advance, draw=draw_traces)
+            return result.summary()
         from airtruth.loop import close_loop
 
         return close_loop(

@@ -69,7 +69,8 @@ def trace_outputs(
 
 
 def _trace_names() -> tuple[str, ...]:
+    from airtruth.reporting import TRACE_PAGE
     from airtruth.tracing.answer import ANSWER
     from airtruth.tracing.presentation.files import EVIDENCE
 
-    return (ANSWER, *EVIDENCE)
+    return (ANSWER, TRACE_PAGE, *EVIDENCE)

@@ -52,7 +52,7 @@ def trace(
     context: typer.Context,
     logs: LogFiles,
     aircraft: Declared,
-    out: Annotated[Path, typer.Option(help="Folder of trace.json, figures and the updated aircraft.")],
+    out: Annotated[Path, typer.Option(help="Folder of trace.json, its page and the updated aircraft.")],
     motion: TracedMotion = None,
     model: Model = "aircraft",
     hold_out: HeldOut = None,

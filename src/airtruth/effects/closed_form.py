@@ -17,7 +17,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 Array = NDArray[np.float64]
@@ -148,6 +147,8 @@ def _fitted(
         starts.append((float(np.sum((size * unit - aim) ** 2)), np.array([size, *others])))
     start = min(starts, key=lambda found: found[0])[1]
     bounds = (np.array([-np.inf, low, 0.0])[:count], np.array([np.inf, high, np.inf])[:count])
+    from scipy.optimize import least_squares  # slow to import, and only learned increments need it
+
     scale = np.array([max(abs(start[0]), 1e-12), span, span])[:count]
     solved = least_squares(lambda p: (form(x, p) - y) / s, start, x_scale=scale, bounds=bounds)
     return solved.x, 2.0 * float(solved.cost)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from airtruth.errors import ConfigurationError, StoreError
+from airtruth.logs.atomic import write_text
 from airtruth.logs.names import ESTIMATES as FILES
 from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.logs.remote import location
@@ -22,9 +23,12 @@ from airtruth.result import Result
 if TYPE_CHECKING:
     from airtruth.aircraft import Aircraft
     from airtruth.reporting.pages.page import Report
+    from airtruth.tracing.result import TraceResult
 
 Source = Path | str | FlownCampaign | Result
 """A folder of a trace, a loop or a campaign, a file of estimates, or a result in memory."""
+TRACE_PAGE: Final = "trace.html"
+"""File of the page that a trace writes into its folder."""
 
 
 def report(
@@ -70,8 +74,30 @@ def report(
     return write_files(made, page, chosen)
 
 
-# The pages are imported where they are needed: the tracer and matplotlib take seconds, and `airtruth tables`, which
-# imports this module as well, needs neither.
+def draw_traces(results: Mapping[Path, TraceResult]) -> None:
+    """Write the page of each trace into its folder; the first one has links to the others.
+
+    Parameters
+    ----------
+    results : folder -> result of one motion.
+
+    Raises
+    ------
+    StoreError
+        If a page cannot be written.
+    """
+    from airtruth.reporting.pages.page import linked
+    from airtruth.reporting.pages.trace_page import trace_report
+
+    links: dict[str, str] = {}
+    for folder, result in reversed(results.items()):
+        page = trace_report(result.answer, result.histories).page
+        write_text(folder / TRACE_PAGE, linked(page, links))
+        links[result.motion] = f"{folder.name}/{TRACE_PAGE}"
+
+
+# The pages are imported where they are needed: the tracer takes seconds, and `airtruth tables`, which imports this module as
+# well, does not need it.
 
 
 def _report(source: Source, logs: Logs | None, aircraft: Aircraft | None) -> Report:

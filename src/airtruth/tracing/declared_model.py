@@ -9,8 +9,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import chdtrc, chdtri, chndtr, ndtri
+from scipy.special import chdtrc, chdtri, chndtrinc, ndtri
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.answer import (
@@ -296,10 +295,7 @@ def traceable_errors(directions: int, derivatives: int = 0) -> float:
     """
     level = 0.25 * CRITERION.declared
     threshold = chdtri(directions, level)
-    power = brentq(
-        lambda noncentrality: 1.0 - chndtr(threshold, directions, noncentrality) - _POWER, 1.0, 1e3
-    )
-    joint = math.sqrt(float(power))
+    joint = math.sqrt(float(chndtrinc(threshold, directions, 1.0 - _POWER)))
     if not derivatives:
         return joint
     each = -math.expm1(math.log1p(-level) / derivatives)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,6 +26,9 @@ from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.result import TraceResult
 from airtruth.tracing.run import answered, begun
 from airtruth.tracing.update import Revision, write_update
+
+Draw = Callable[[Mapping[Path, TraceResult]], None]
+"""Draws the result of each folder into it."""
 
 
 @dataclass(frozen=True)
@@ -160,15 +163,17 @@ def trace(
     out: Path | None = None,
     force: bool = False,
     advance: Advance = lambda step: None,
+    draw: Draw = lambda results: None,
 ) -> TraceResult:
     """Trace the residual of flight logs to the effects that the declared aircraft lacks, for each motion that they excite.
 
     Parameters
     ----------
     logs, aircraft, options, force : as of `airtruth.tracing.run.trace`.
-    out : folder of trace.json, the figures and the updated aircraft; None to write nothing. Where both motions are answered,
+    out : folder of trace.json, the records and the updated aircraft; None to write nothing. Where both motions are answered,
         those of the lateral one are in the folder "lateral" within.
     advance : receives the step that begins; of a second motion with its name.
+    draw : draws what is written, before trace.json makes the folder complete.
 
     Raises
     ------
@@ -188,7 +193,7 @@ def trace(
             if stale.exists():
                 atomic.remove_file(stale)
     folders = [part.into(out) for part in parts]
-    first, *others = traced(logs, declared, parts, folders, force, advance)
+    first, *others = traced(logs, declared, parts, folders, force, advance, draw)
     return replace(first, others=tuple(others))
 
 
@@ -199,6 +204,7 @@ def traced(
     folders: Sequence[Path | None],
     force: bool = False,
     advance: Advance = lambda step: None,
+    draw: Draw = lambda results: None,
 ) -> tuple[TraceResult, ...]:
     """Trace each motion, with one size of each cause that acts in several, and write one updated aircraft.
 
@@ -233,9 +239,10 @@ def traced(
         rest = [answered(own, stated, collect) for own in others]
         results = [answered(first, (), write), *rest]
     told = [_with_causes(result, results[0].answer, causes) for result in results]
-    for result, folder in zip(told, folders, strict=True):
-        if folder is not None:
-            result.write(folder)
+    written = {folder: result for result, folder in zip(told, folders, strict=True) if folder is not None}
+    draw(written)
+    for folder, result in written.items():
+        result.write(folder)
     return tuple(told)
 
 

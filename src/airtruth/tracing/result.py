@@ -108,7 +108,7 @@ class TraceResult:
         return as_figure(trace_chart(self.answer, self.histories))
 
     def write(self, out: Path) -> None:
-        """Write the figures, the records and the errors into the folder of the trace, and trace.json at the end.
+        """Write the records and the errors into the folder of the trace, and trace.json at the end.
 
         Raises
         ------

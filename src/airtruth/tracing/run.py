@@ -61,7 +61,7 @@ def trace(
     logs : logs of one aircraft: files, folders, campaign folders, logs in memory, or a sequence of these.
     aircraft : folder with aircraft.toml, a shipped name, or a loaded aircraft.
     options : choices; None for the defaults.
-    out : folder of trace.json, the figures and the updated aircraft; None to write nothing.
+    out : folder of trace.json, the records and the updated aircraft; None to write nothing.
     force : trace logs that contradict physics all the same; the answer lists the faults.
     advance : receives the step that begins.
     runs : runs to trace; None for all.
@@ -88,7 +88,7 @@ class Begun:
     ----------
     logs : behind the gate; declared : the aircraft.
     search : of the effects.
-    out : folder of trace.json and the figures; None to write nothing.
+    out : folder of trace.json and the records; None to write nothing.
     forced : faults of the logs that the caller overruled; remarks : for the answer, sentences without a final period.
     origin : version, options and digests of the inputs.
     """

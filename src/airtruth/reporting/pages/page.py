@@ -194,7 +194,7 @@ def write_files(report: Report, out: Path, kind: str) -> tuple[Path, ...]:
     alone = replace(report, beside={})
     paths = files_of(alone, out, kind)
     if kind == PAGE:
-        page = _linked(report.page, {name: beside(out, name).name for name in report.beside})
+        page = linked(report.page, {name: beside(out, name).name for name in report.beside})
         for path, content in zip(paths, (page, report.csv, report.latex), strict=True):
             write_text(path, content)
     else:
@@ -207,7 +207,7 @@ def write_files(report: Report, out: Path, kind: str) -> tuple[Path, ...]:
     return (*paths, *more)
 
 
-def _linked(page: str, files: Mapping[str, str]) -> str:
+def linked(page: str, files: Mapping[str, str]) -> str:
     """A page with links to those of other motions above its navigation."""
     links = "".join(
         f'<p class="note">{html.escape(MOTIONS[name].heading)}: <a href="{html.escape(file)}">{html.escape(file)}</a></p>\n'
@@ -226,6 +226,7 @@ __all__ = [
     "data_table",
     "files_of",
     "format_of",
+    "linked",
     "notes_html",
     "page_of",
     "preformatted",

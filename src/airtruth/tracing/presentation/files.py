@@ -1,4 +1,4 @@
-"""The files of a trace that show its evidence: figures, records and errors."""
+"""The files of a trace that hold its evidence: records and errors."""
 
 from __future__ import annotations
 
@@ -6,23 +6,18 @@ import textwrap
 from pathlib import Path
 from typing import Final
 
-from airtruth import style
-from airtruth.charts import as_figure
 from airtruth.logs.atomic import make_folder, write_text
 from airtruth.logs.histories import FILE, Histories, write_histories
 from airtruth.table import WIDTH
 from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.presentation.charts import innovations_chart, scores_chart, trace_chart
 from airtruth.tracing.presentation.error_table import error_csv
 from airtruth.tracing.presentation.text import verdict
 
-FIGURES: Final = ("trace.png", "scores.png", "innovations.png")
-"""Files of the figures: residuals of one record with the effect, the candidates, the innovations."""
 ERRORS: Final = "error.csv"
 """File of the errors in long form."""
 PROVISIONAL: Final = "provisional.txt"
 """File of an updated aircraft whose answer is provisional."""
-EVIDENCE: Final = (*FIGURES, FILE, ERRORS)
+EVIDENCE: Final = (FILE, ERRORS)
 """Every file of `write_evidence`."""
 
 
@@ -47,7 +42,7 @@ def mark_provisional(answer: TraceAnswer) -> Path | None:
 
 
 def write_evidence(answer: TraceAnswer, histories: Histories, out: Path) -> tuple[Path, ...]:
-    """Write the figures of a trace, the records behind them and its errors into its folder.
+    """Write the records of a trace and its errors into its folder.
 
     Parameters
     ----------
@@ -65,12 +60,9 @@ def write_evidence(answer: TraceAnswer, histories: Histories, out: Path) -> tupl
         If a file cannot be written.
     """
     make_folder(out)
-    drawn = (trace_chart(answer, histories), scores_chart(answer), innovations_chart(histories))
-    for name, chart in zip(FIGURES, drawn, strict=True):
-        style.save(as_figure(chart), out / name)
     write_histories(out / FILE, histories)
     write_text(out / ERRORS, error_csv(answer))
     return tuple(out / name for name in EVIDENCE)
 
 
-__all__ = ["ERRORS", "EVIDENCE", "FIGURES", "PROVISIONAL", "mark_provisional", "write_evidence"]
+__all__ = ["ERRORS", "EVIDENCE", "PROVISIONAL", "mark_provisional", "write_evidence"]
