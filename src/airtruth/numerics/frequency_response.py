@@ -81,7 +81,8 @@ def frequency_response(
     n = min(map(len, inputs))
     x, y = (np.stack([np.asarray(one[:n], dtype=np.float64) for one in own]) for own in (inputs, outputs))
     f, of_x, of_y = np.fft.rfftfreq(n, dt_s), _transformed(x), _transformed(y)
-    sides = np.where((f > 0.0) & (2 * np.arange(len(f)) < n), 2.0, 1.0)  # a line stands for its negative frequency too
+    # a line stands for its negative frequency too
+    sides = np.where((f > 0.0) & (2 * np.arange(len(f)) < n), 2.0, 1.0)
     sxy = sides * of_x.conj() * of_y
     sxx, syy = (sides * np.abs(one) ** 2 for one in (of_x, of_y))
     band = _bands(f, highest_hz)
