@@ -80,7 +80,8 @@ def frequency_response(
         raise ValueError(f"a frequency response needs records of at least {_LEAST_SAMPLES} samples")
     n = min(map(len, inputs))
     x, y = (np.stack([np.asarray(one[:n], dtype=np.float64) for one in own]) for own in (inputs, outputs))
-    f, of_x, of_y = np.fft.rfftfreq(n, dt_s), _transformed(x), _transformed(y)
+    f: Array = np.asarray(np.fft.rfftfreq(n, dt_s), dtype=np.float64)
+    of_x, of_y = _transformed(x), _transformed(y)
     # a line stands for its negative frequency too
     sides = np.where((f > 0.0) & (2 * np.arange(len(f)) < n), 2.0, 1.0)
     sxy = sides * of_x.conj() * of_y

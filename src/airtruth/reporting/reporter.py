@@ -90,7 +90,7 @@ def draw_traces(results: Mapping[Path, TraceResult]) -> None:
     from airtruth.reporting.pages.trace_page import trace_report
 
     links: dict[str, str] = {}
-    for folder, result in reversed(results.items()):
+    for folder, result in reversed([*results.items()]):
         page = trace_report(result.answer, result.histories).page
         write_text(folder / TRACE_PAGE, linked(page, links))
         links[result.motion] = f"{folder.name}/{TRACE_PAGE}"
