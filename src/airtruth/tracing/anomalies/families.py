@@ -19,9 +19,6 @@ from airtruth.tracing.model.surface import play
 
 Array = NDArray[np.float64]
 
-_UNIT: Final = {"force": 1e-3, "moment": 1e-4, "output": 1e-4}
-"""Amounts for differences of a coefficient [-] and of an output [rad, rad/s] (judgement: small against noise, large against
-rounding)."""
 _BASIS: Final = 5
 """Number of Laguerre functions of a control [-] (judgement: with the pole below they reach from 0.2 to 2 Hz)."""
 _POLE_RAD_S: Final = 6.0
@@ -70,23 +67,19 @@ class Destinations:
     ----------
     forces : of the coefficients; vane : of the vane.
     drifting : of the vane and the gyros, which respond at once and may drift.
-    units : amount for differences of each [-, rad, rad/s].
     """
 
     forces: tuple[int, ...]
     vane: int
     drifting: tuple[int, ...]
-    units: tuple[float, ...]
 
     @classmethod
     def of(cls, motion: Motion) -> Destinations:
         """Those of a motion."""
         count = len(motion.coefficients)
-        kinds = ["force" if c.length is None else "moment" for c in motion.coefficients]
         at_once = [count + i for i, y in enumerate(motion.outputs) if y.instrument in ("vane", "gyro")]
         vane = next(count + i for i, y in enumerate(motion.outputs) if y.instrument == "vane")
-        units = (*(_UNIT[kind] for kind in kinds), *(_UNIT["output"] for _ in motion.outputs))
-        return cls(tuple(range(count)), vane, tuple(at_once), units)
+        return cls(tuple(range(count)), vane, tuple(at_once))
 
     def output(self, to: int) -> int | None:
         """Number of the output; None for a coefficient."""

@@ -25,9 +25,10 @@ from airtruth.tracing.inference.direction import inserted, projected
 from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
-from airtruth.tracing.model.records import TraceRecord, nodes
-from airtruth.tracing.model.response import External, Response, filter_inputs, respond_to
+from airtruth.tracing.model.records import nodes
+from airtruth.tracing.model.response import Response, filter_inputs, respond_to
 from airtruth.tracing.model.settings import without
+from airtruth.tracing.model.tangent import propagated, tangent_of
 
 Array = NDArray[np.float64]
 
@@ -163,30 +164,21 @@ def _rate(x: Array, dt_s: float) -> Array:
 
 def _tangents(null: PosteriorFit, problem: TraceProblem, index: int, series: Series) -> Array:
     """Whitened derivatives of a record's innovations in the amounts of some series, (series, samples, outputs)."""
-    record: TraceRecord = problem.records[index]
     base, to = null.sensitivities[index], Destinations.of(problem.layout.motion)
-    given = filter_inputs(record, null.hypothesis.compiled(null.point.sizes))
-    still = np.zeros_like(base.r)
-    nothing = np.zeros((len(to.forces), (len(still) - 1) * record.signals.sub + 1))
-
-    def response(more: External | None = None) -> Response:
-        common, own = null.point.common, null.point.per_record[index]
-        return respond_to(given, problem.settings, common, own, external=more)
-
-    e, t = response().e, []
-    for where, x in series:
-        unit, column = to.units[where], to.output(where)
-        force, output = nothing, still
+    given = filter_inputs(problem.records[index], null.hypothesis.compiled(null.point.sizes))
+    tangent = tangent_of(given, problem.settings, null.point.common, null.point.per_record[index])
+    if tangent is None:  # the motion diverges, and no direction has evidence
+        return np.zeros((len(series), *base.r.shape))
+    force = np.zeros((2 * len(tangent.matrices.phi) + 1, len(to.forces), len(series)))
+    reading = np.zeros((*given.y.shape, len(series)))
+    for number, (where, x) in enumerate(series):
+        column = to.output(where)
         if column is None:
-            force = nothing.copy()
-            force[where] = unit * x
+            force[-len(x) :, where, number] = x
         else:
-            output = still.copy()
-            output[:, column] = unit * x
-        moved = response(External(force, output))
-        sound = np.isfinite(moved.logdet)  # else the motion diverged, and the direction has no evidence
-        t.append((moved.e - e) @ base.white.T / unit if sound else np.zeros_like(e))
-    return np.array(t)
+            reading[given.lead :, column, number] = x / tangent.sensors.scale[column]
+    at_points = np.stack([force[:-2:2], force[1:-1:2], force[2::2]], axis=1)
+    return np.asarray(propagated(tangent, at_points, reading) @ base.white.T)
 
 
 __all__ = ["anomalies", "chi_square", "views"]

@@ -87,8 +87,7 @@ class _BestFirst:
         self.causes = tuple(c for c in declared.causes if c.key not in held)
         self.wrong_allowed = declared.wrong_allowed
         self.is_sound = Soundness(sets.problem, null)
-        self.temper = 1.0
-        self.refits = 1
+        self.temper, self.refits = 1.0, 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
         self._read: dict[tuple[int, float], list[EvaluatedSet]] = {}
         self._expansions: list[Expansion] = []
@@ -128,13 +127,11 @@ class _BestFirst:
                 self._refused.append(fitted)
                 continue
             if following is None or self.refits >= limit:
-                if self._reweighed():
-                    continue
-                if swept or not self._is_misfit(fitted):
-                    break
-                swept = True
-                self._sweep()
-                limit = self.refits + REFITS
+                if not self._reweighed():
+                    if swept or not self._is_misfit(fitted):
+                        break
+                    self._sweep()
+                    swept, limit = True, self.refits + REFITS
                 continue
             if not may_begin(self.advance, f"refit {' + '.join(following.names)}"):
                 break
@@ -163,15 +160,16 @@ class _BestFirst:
     def _begin_at(self, known: Mapping[str, float]) -> None:
         """Refit a set from the declared aircraft at known values."""
         effects = tuple(e for e in self.effects if e.key in known and len(e.parameters) == 1)
-        if not effects or not may_begin(self.advance, f"refit {' + '.join(e.key for e in effects)}"):
-            return
-        self._from_declared(effects, [e.parameters[0].size(known[e.key]) for e in effects])
+        if effects and may_begin(self.advance, f"refit {' + '.join(e.key for e in effects)}"):
+            self._from_declared(effects, [e.parameters[0].size(known[e.key]) for e in effects])
 
-    def _from_declared(self, effects: tuple[Effect, ...], sizes: Sequence[float]) -> PosteriorFit | None:
-        """Refit a set from the declared aircraft."""
+    def _from_declared(
+        self, effects: tuple[Effect, ...], sizes: Sequence[float], rival: float = np.inf
+    ) -> PosteriorFit | None:
+        """Refit a set from the declared aircraft, unless its cost cannot reach that of a rival."""
         hypothesis = replace(self.hypothesis, effects=effects)
         self.refits += 1
-        return self._enter(self.sets.fit_from_declared(hypothesis, np.array(sizes), self.null))
+        return self._enter(self.sets.fit_from_declared(hypothesis, np.array(sizes), self.null, rival))
 
     def _is_overfitted(self, fitted: PosteriorFit) -> bool:
         """Whether records left out refuse a possible fit: another set may explain them all.
@@ -188,15 +186,19 @@ class _BestFirst:
     def _sweep(self) -> None:
         """Refit every effect alone from the declared aircraft, until one of them leaves no anomaly beyond doubt.
 
-        About a fit that lacks a large effect no quadratic shows it.
+        About a fit that lacks a large effect no quadratic shows it. Its gain bounds its evidence, so that a refit ends once it
+        cannot come within the odds of the best set.
         """
+        bare = max(p.weighed.log_evidence for p in self._of_fit(frozenset()))
+        lead = self._best().weighed.log_evidence - bare + float(np.log(CRITERION.level))
+        rival = self.null.cost - self.temper * lead
         for effect in self.effects:
             first = effect.parameters[0]
             if frozenset((effect.key,)) in self._fits or len(effect.parameters) > 1:
                 continue
             if not may_begin(self.advance, f"refit {effect.key}"):
                 return
-            own = self._from_declared((effect,), [(first.sign or 1.0) * first.material])
+            own = self._from_declared((effect,), [(first.sign or 1.0) * first.material], rival)
             if own is not None and own.cost < self.null.cost and not self._is_misfit(own):
                 return
 

@@ -88,11 +88,16 @@ class EffectColumn:
         first = self.effect.parameters[0]
         return first.prior_std**-2.0, first.prior_mean * first.prior_std**-2.0
 
+    @cached_property
+    def _late_signal(self) -> str:
+        return "" if self.effect is None else self.effect.late_signal
+
     def may_join(self, other: EffectColumn) -> bool:
         """Whether both may be in one set: not two variants of one effect, but delays of two channels."""
-        late = [("" if c.effect is None else c.effect.late_signal) for c in (self, other)]
-        apart = late[0] != late[1] and "" not in late
-        return self.key != other.key and (self.label != other.label or apart)
+        if self.label != other.label:
+            return True
+        late = self._late_signal, other._late_signal
+        return self.key != other.key and late[0] != late[1] and "" not in late
 
 
 class SizePriors(NamedTuple):
