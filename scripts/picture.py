@@ -13,7 +13,7 @@ from typing import Final
 import airtruth as at
 from airtruth import style
 from airtruth.starting.texts import campaign_text
-from scripts.match_figure import match_figure
+from airtruth.tracing.presentation.match_figure import match_figure
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 """Root of the repository."""

@@ -35,7 +35,7 @@ from airtruth.reporting.statistics import (
 )
 from airtruth.table import WIDTH, significant
 from airtruth.tracing.presentation.charts import innovations_chart, scores_chart, trace_chart
-from scripts.match_figure import match_figure
+from airtruth.tracing.presentation.match_figure import match_figure
 
 TRUTH = np.array([4.8, 30.0, 0.5, -1.8, -41.0, -1.9])
 

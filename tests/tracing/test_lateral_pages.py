@@ -15,11 +15,11 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import ANSWER, DeclaredModel, Derivatives, DerivativeShift, TraceAnswer
 from airtruth.tracing.presentation.brief import MOST_LINES, as_brief_text
 from airtruth.tracing.presentation.charts import trace_charts
+from airtruth.tracing.presentation.match_figure import columns_of, match_figure
 from airtruth.tracing.presentation.several import by_motion, html_under_headings, under_headings
 from airtruth.tracing.presentation.text import as_trace_text
 from airtruth.tracing.presentation.tolerances import tolerance_table
 from airtruth.tracing.stage_errors import BySet, Errors, Excursions, Rms, Tolerances
-from scripts.match_figure import columns_of, match_figure
 
 SAMPLE = json.loads((Path(__file__).resolve().parents[1] / "reporting" / "trace_sample.json").read_text())
 CHANNELS = LATERAL.output_channels
