@@ -5,12 +5,13 @@ from dataclasses import replace
 import lateral_records as lr
 import numpy as np
 import pytest
+from added_signals import Added, flown_with
 
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing.model.corners import input_columns, spread_of
 from airtruth.tracing.model.linearise import linearise
-from airtruth.tracing.model.response import External, filter_inputs, respond_to
+from airtruth.tracing.model.response import filter_inputs, respond_to
 from airtruth.tracing.model.tangent import POINTS, flown_of, propagated, tangent_of
 from airtruth.units import DEG
 
@@ -60,11 +61,11 @@ def test_increments_are_those_of_two_flights(name):
         found = propagated(tangent, force[..., None], (shown[3] * output)[..., None])[0]
         h = 1e-6
         ends = [
-            respond_to(
+            flown_with(
+                Added(sign * h * shown[:3, None] * lines, sign * h * shown[3] * output),
                 *(given, lr.SETTINGS, common, own),
                 steady=base.steady,
-                external=External(sign * h * shown[:3, None] * lines, sign * h * shown[3] * output),
-            ).e
+            )
             for sign in (1.0, -1.0)
         ]
         expected = (ends[0] - ends[1]) / (2.0 * h)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trace_records as tr
+from added_signals import Added, flown_with
 from scipy.signal import lsim, lti
 
 from airtruth.effects.increment import Memory, Shape, increment
@@ -16,7 +17,7 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.learning.increment_inputs import FlownMotion, sensitivities_to
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
-from airtruth.tracing.model.response import External, filter_inputs, respond_to
+from airtruth.tracing.model.response import filter_inputs, respond_to
 from airtruth.tracing.model.tangent import POINTS, flown_of, propagated, tangent_of
 
 LATE = Change(sensors=(SensorTerm("q_rad_s", "lag", 0.03), SensorTerm("az_m_s2", "delay", 0.015)))
@@ -81,14 +82,14 @@ def test_increments_change_the_innovations_as_in_flights(name):
         found = propagated(tangent, own[..., None], reading[..., None])[0]
         h = 1e-6
         ends = [
-            respond_to(
-                *arguments,
-                steady=base.steady,
-                external=External(
+            flown_with(
+                Added(
                     sign * h * np.array([lift * (kind == "lift"), moment * (kind == "moment")]),
                     sign * h * output * tangent.sensors.scale * (kind == "output"),
                 ),
-            ).e
+                *arguments,
+                steady=base.steady,
+            )
             for sign in (1.0, -1.0)
         ]
         expected = (ends[0] - ends[1]) / (2.0 * h)

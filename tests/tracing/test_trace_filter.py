@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trace_records as tr
+from added_signals import Added, flown_with
 from scipy.linalg import block_diag
 
 from airtruth.effects.registry import EFFECTS
@@ -13,7 +14,7 @@ from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, SensorTerm, St
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.linearise import gain
 from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.model.response import LOST, External, filter_inputs, respond
+from airtruth.tracing.model.response import LOST, filter_inputs, respond
 from airtruth.units import DEG, G0
 
 
@@ -314,14 +315,14 @@ def test_signals_of_a_part_act_in_the_part():
     part = replace(whole, signals=whole.signals.part("part", 0, 45, whole.samples))
     rng = np.random.default_rng(9)
     points, sub = (part.samples - 1) * whole.signals.sub + 1, whole.signals.sub
-    more = External(1e-3 * rng.standard_normal((2, points)), 1e-3 * rng.standard_normal((part.samples, 3)))
-    padded = External(
+    more = Added(1e-3 * rng.standard_normal((2, points)), 1e-3 * rng.standard_normal((part.samples, 3)))
+    padded = Added(
         np.pad(more.force, ((0, 0), (45 * sub, 0))),
         np.pad(more.output, ((45, 0), (0, 0))),
     )
     common, per_record = tr.still()
     found, expected = (
-        respond(r, tr.SETTINGS, Change(), common, per_record, external=e, free_run=True).e
+        flown_with(e, filter_inputs(r, Change()), tr.SETTINGS, common, per_record, free_run=True)
         for r, e in ((part, more), (whole, padded))
     )
     np.testing.assert_array_equal(found, expected[45:])

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trace_records as tr
+from added_signals import Added, flown_with
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
@@ -18,7 +19,7 @@ from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.records import nodes
-from airtruth.tracing.model.response import External, respond
+from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.model.surface import play
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.units import DEG
@@ -144,14 +145,14 @@ def changed(made, more):
     return replace(made, signals=replace(made.signals, y=made.signals.y + more))
 
 
-def difference(made, change=None, external=None):
+def difference(made, change=None, added=None):
     """What a change, or a moment, does to the outputs of a free run of the linear aircraft."""
     common, per_record = tr.still()
     before = respond(made, tr.SETTINGS, Change(), common, per_record, free_run=True).e
-    after = respond(
-        made, tr.SETTINGS, change or Change(), common, per_record, external=external, free_run=True
-    ).e
-    return before - after
+    if added is None:
+        return before - respond(made, tr.SETTINGS, change, common, per_record, free_run=True).e
+    given = filter_inputs(made, Change())
+    return before - flown_with(added, given, tr.SETTINGS, common, per_record, free_run=True)
 
 
 def test_p_values_are_uniform_where_nothing_is_missing():
@@ -177,10 +178,8 @@ def test_an_elevator_that_loses_effect_is_seen_over_the_deflection():
     records = []
     for made in pair(np.random.default_rng(10)):
         de = nodes(made.signals.elevator_rad)
-        moment = External(
-            np.array([np.zeros(de.size), 15.0 * de * np.abs(de)]), np.zeros_like(made.signals.y)
-        )
-        records.append(changed(made, difference(made, external=moment)))
+        moment = Added(np.array([np.zeros(de.size), 15.0 * de * np.abs(de)]), np.zeros_like(made.signals.y))
+        records.append(changed(made, difference(made, added=moment)))
     found = seen(records)
     assert found[SURFACE].p_value < 1e-6
     assert found[SURFACE].p_value < min(found[STATIC].p_value, found[ELEVATOR].p_value)
@@ -195,8 +194,8 @@ def test_hysteresis_is_seen_in_the_history():
             np.arange(len(smooth)),
             smooth - play(smooth, 0.5 * DEG),
         )
-        moment = External(np.array([np.zeros(lag.size), -0.8 * lag]), np.zeros_like(made.signals.y))
-        records.append(changed(made, difference(made, external=moment)))
+        moment = Added(np.array([np.zeros(lag.size), -0.8 * lag]), np.zeros_like(made.signals.y))
+        records.append(changed(made, difference(made, added=moment)))
     found = seen(records)
     assert found[HISTORY].p_value < 1e-6
     assert found[HISTORY].p_value < found[STATIC].p_value
@@ -247,10 +246,10 @@ def test_a_drift_is_seen_in_time(drifts):
     records = []
     for made in pair(np.random.default_rng(11)):
         time = np.linspace(0.0, 1.0, nodes(made.signals.elevator_rad).size)
-        moment = External(np.array([np.zeros(time.size), 0.006 * time]), np.zeros_like(made.signals.y))
+        moment = Added(np.array([np.zeros(time.size), 0.006 * time]), np.zeros_like(made.signals.y))
         more = np.zeros_like(made.signals.y)
         more[:, 1] = 0.5 * DEG * np.linspace(0.0, 1.0, len(more))
-        records.append(changed(made, difference(made, external=moment) if drifts == "moment" else more))
+        records.append(changed(made, difference(made, added=moment) if drifts == "moment" else more))
     found = seen(records)
     assert found[DRIFT].p_value < 1e-6
     assert found[DRIFT].p_value < min(found[name].p_value for name in (STATIC, SURFACE, VANE))

@@ -48,20 +48,6 @@ _MOST_SLOW: Final = 0.99
 
 
 @dataclass(frozen=True)
-class External:
-    """Signals added to the coefficients, for tests that name no effect.
-
-    Attributes
-    ----------
-    force : (coefficients, points) in the order of the motion [-].
-    output : (samples, outputs) added to the outputs [their units].
-    """
-
-    force: Array
-    output: Array
-
-
-@dataclass(frozen=True)
 class Response:
     """Innovations of one record.
 
@@ -215,7 +201,6 @@ def respond(
     common: Array,
     per_record: Array,
     *,
-    external: External | None = None,
     free_run: bool = False,
 ) -> Response:
     """Innovations, or with ``free_run`` the residuals of a simulation, of one record.
@@ -223,10 +208,9 @@ def respond(
     Parameters
     ----------
     common, per_record : see `CommonEntries` and `RecordEntries`.
-    external : further signals.
     """
     given = filter_inputs(record, change)
-    return respond_to(given, settings, common, per_record, external=external, free_run=free_run)
+    return respond_to(given, settings, common, per_record, free_run=free_run)
 
 
 def respond_to(
@@ -235,7 +219,6 @@ def respond_to(
     common: Array,
     per_record: Array,
     *,
-    external: External | None = None,
     free_run: bool = False,
     steady: SteadyFilter | None = None,
 ) -> Response:
@@ -246,7 +229,7 @@ def respond_to(
     steady : filter of parameters that differ in initial state, biases and trim alone; None makes it.
     """
     e = np.full_like(given.y, LOST)
-    kernel = kernel_input(given, settings, common, per_record, external)
+    kernel = kernel_input(given, settings, common, per_record)
     none = np.eye(given.y.shape[1])
     if free_run:
         sound = record_filter.free_run(kernel, e)
@@ -260,22 +243,11 @@ def respond_to(
     return Response(e, used.white, used.covariance, logdet, more, used)
 
 
-def kernel_input(
-    given: FilterInputs,
-    settings: Settings,
-    common: Array,
-    per_record: Array,
-    external: External | None = None,
-) -> KernelInput:
+def kernel_input(given: FilterInputs, settings: Settings, common: Array, per_record: Array) -> KernelInput:
     """Input of the compiled filter."""
     trim = per_record[settings.layout.per_record.trim]
-    more = np.zeros_like(given.y)
     named = zip(coefficients_of(given.grid), trim, strict=True)
     force = {name: getattr(given.grid, name) + own for name, own in named}
-    if external is not None:
-        more[given.lead :] = external.output
-        for row, own in zip(force.values(), external.force, strict=True):
-            row[-own.size :] += own
     gust, path = per_record[settings.layout.per_record.mean_gust], {}
     if gust.size:
         upwash, tailwind = gust
@@ -286,7 +258,7 @@ def kernel_input(
     signals = given.record.signals
     return KernelInput(
         y=given.y,
-        more=more,
+        more=np.zeros_like(given.y),
         grid=given.grid._replace(**force, **path),
         corner_rad2=given.corner_rad2,
         dt_s=signals.dt_s,
@@ -349,7 +321,6 @@ def pack_sensors(
 
 __all__ = [
     "LOST",
-    "External",
     "FilterInputs",
     "Response",
     "filter_inputs",
