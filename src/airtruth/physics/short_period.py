@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.linear_model import Linear, Structure, bare
 from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
@@ -128,6 +129,32 @@ def normal_force_row(theta: Array, s: Scale) -> Array:
     return np.stack([-n * th[..., 0], -n * s.half_chord_time * th[..., 1], -n * th[..., 2]], axis=-1)
 
 
+def linear_system(theta: Array, s: Scale) -> Linear:
+    """The linear model of derivatives: `system` and `normal_force_row`.
+
+    Parameters
+    ----------
+    theta : (..., 6) derivatives [-]; s : factors of shape (...).
+    """
+    (a, b), row, states = system(theta, s), normal_force_row(theta, s), len(LONGITUDINAL.states)
+    own = structure(s)
+    c, d = (
+        np.zeros((*row.shape[:-1], *own.seen.shape)) + own.seen,
+        np.zeros((*row.shape[:-1], len(own.seen), 1)),
+    )
+    c[..., -1, :], d[..., -1, :] = row[..., :states], row[..., states:]
+    return Linear(a, b[..., None], c, d)
+
+
+def structure(s: Scale) -> Structure:
+    """The parts of the linear model that the flight condition alone decides."""
+    own = bare(LONGITUDINAL, s.half_chord_time)
+    own.kinematics[..., 0, 1] = 1.0
+    own.forces[..., 0, 0], own.forces[..., 1, 1] = -s.lift, s.moment
+    own.accelerations[..., -1, 0] = -s.normal
+    return own
+
+
 def modal(theta: Array, s: Scale) -> tuple[Array, Array]:
     """Natural frequency [rad/s] and damping ratio [-] of the two-state model.
 
@@ -167,9 +194,11 @@ __all__ = [
     "PitchConstants",
     "Scale",
     "derivatives",
+    "linear_system",
     "modal",
     "normal_force_row",
     "scale",
     "scale_of",
+    "structure",
     "system",
 ]

@@ -31,7 +31,8 @@ from airtruth.identification.lateral.responses import LANES, Driven, filter_rows
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
 from airtruth.numerics.prefilter import butterworth, zero_phase
-from airtruth.physics.lateral import places, structure
+from airtruth.physics.lateral import structure
+from airtruth.physics.linear_model import places
 from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]

@@ -67,15 +67,15 @@ class Records(Generic[S]):
 def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) -> Records[Scale]:
     """Signals and predictor of a batch; nothing is checked.
 
-    The elevator between samples has the area of the cubic through the four nearest samples, and the
+    The surface between samples has the area of the cubic through the four nearest samples, and the
     corners of a first-order servo behind a held command where the record shows one
     (`airtruth.numerics.intersample`).
     """
     condition = Options(condition=options.condition, airspeed_m_s=options.airspeed_m_s)
     scale = observe(batch, constants, condition).scale
     y = np.stack([batch.channels[CHANNELS[name]] for name in options.outputs], axis=2)
-    elevator = batch.channels["elevator_rad"]
-    u = elevator - elevator[:, :1]
+    surface = batch.channels[LONGITUDINAL.surfaces[0]]
+    u = surface - surface[:, :1]
     bend = servo_bend(u, declared_decay=decay_of(batch.servo_s, batch.dt_s))
     predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
     u, bend = u[:, :, None], bend[:, :, None]
