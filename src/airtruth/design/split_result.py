@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
+from airtruth.design.planned_campaign import PlannedCampaign, draw_input
 from airtruth.design.separation import Member
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
@@ -198,7 +198,7 @@ class SplitResult(PlannedCampaign):
         p = self.prediction
         with style.applied():
             figure, axes = style.panels(4, 1, width_in=6.5, height_in=7.2, sharex=True)
-            draw_elevator(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
+            draw_input(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
             for k, label in enumerate(_LABELS):
                 ax, scale = axes[k + 1, 0], _SCALES[k]
                 ax.axhspan(

@@ -194,6 +194,15 @@ def _bends(surface: Array, decay: Array, command: Array, bend: Array) -> None:
             out[k + 1] = mean - (13.0 * (start + end) - before - after) / 24.0
 
 
+def smooth_bend(x: Array, axis: int = -1) -> Array:
+    """Mean of the cubic through the four nearest samples over the cell that ends at each sample, less that of its ends."""
+    u = np.moveaxis(x, axis, -1)
+    edge = np.concatenate([u[..., :1], u, u[..., -1:]], axis=-1)
+    bend = np.zeros_like(u)
+    bend[..., 1:] = (edge[..., 1:-2] + edge[..., 2:-1] - edge[..., :-3] - edge[..., 3:]) / 24.0
+    return np.moveaxis(bend, -1, axis)
+
+
 def servo_bend(surface: Array, noise_std_rad: float = 0.0, declared_decay: float = 0.0) -> Array:
     """Mean over the cell that ends at each sample: reconstructed servo motion minus the smooth hold.
 

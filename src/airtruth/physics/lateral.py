@@ -17,35 +17,23 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.linear_model import Linear, Structure, bare, places
+from airtruth.physics.linear_model import BodyConstants, Linear, Structure, bare, places
 from airtruth.physics.motion import LATERAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
 
-class LateralConstants(Protocol):
+class LateralConstants(BodyConstants, Protocol):
     """Constants of the aircraft that the lateral-directional motion needs."""
-
-    @property
-    def wing_area_m2(self) -> float:
-        """Reference area S [m2]."""
 
     @property
     def span_m(self) -> float:
         """Span b [m]."""
 
     @property
-    def mass_kg(self) -> float:
-        """Mass m [kg]."""
-
-    @property
     def inertia_xx_kg_m2(self) -> float:
         """Roll inertia Ixx [kg m2]."""
-
-    @property
-    def inertia_yy_kg_m2(self) -> float:
-        """Pitch inertia Iyy [kg m2]."""
 
     @property
     def inertia_zz_kg_m2(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,22 @@ from numpy.typing import NDArray
 from airtruth.physics.motion import Motion
 
 Array = NDArray[np.float64]
+
+
+class BodyConstants(Protocol):
+    """Constants of the aircraft that every motion needs."""
+
+    @property
+    def wing_area_m2(self) -> float:
+        """Reference area S [m2]."""
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass m [kg]."""
+
+    @property
+    def inertia_yy_kg_m2(self) -> float:
+        """Pitch inertia Iyy [kg m2]."""
 
 
 class Linear(NamedTuple):
@@ -75,4 +91,4 @@ def places(motion: Motion) -> tuple[tuple[bool, int], ...]:
     )
 
 
-__all__ = ["Linear", "Structure", "bare", "places"]
+__all__ = ["BodyConstants", "Linear", "Structure", "bare", "places"]

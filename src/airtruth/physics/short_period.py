@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.linear_model import Linear, Structure, bare
+from airtruth.physics.linear_model import BodyConstants, Linear, Structure, bare
 from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
@@ -21,24 +21,12 @@ CL_ALPHA, CL_Q, CL_DE, CM_ALPHA, CM_Q, CM_DE = range(len(LONGITUDINAL.parameters
 """Positions in ``LONGITUDINAL.parameters``."""
 
 
-class PitchConstants(Protocol):
+class PitchConstants(BodyConstants, Protocol):
     """Constants of the aircraft that the short period needs."""
-
-    @property
-    def wing_area_m2(self) -> float:
-        """Reference area S [m2]."""
 
     @property
     def chord_m(self) -> float:
         """Mean aerodynamic chord c [m]."""
-
-    @property
-    def mass_kg(self) -> float:
-        """Mass m [kg]."""
-
-    @property
-    def inertia_yy_kg_m2(self) -> float:
-        """Pitch inertia Iyy [kg m2]."""
 
 
 @dataclass(frozen=True)

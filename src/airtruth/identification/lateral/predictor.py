@@ -37,6 +37,8 @@ from airtruth.identification.likelihood.predictor import (
     Predictor,
     Term,
     actions,
+    extended,
+    floor_terms,
     gust_terms,
     kinematic_terms,
     layout,
@@ -44,7 +46,7 @@ from airtruth.identification.likelihood.predictor import (
 )
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import servo_bend, smooth_bend
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.lateral import LateralConstants, LateralScale, structure
@@ -66,8 +68,6 @@ SURPLUS: Final = tuple(f"surplus_{signal.name}" for signal in LATERAL.signals)
 """Known inputs: each signal times the surplus of the dynamic pressure."""
 TERM: Final = "term_{}_{}"
 """Known input: a nonlinear term by its name and the name of its signal."""
-_FLOOR: Final = 1e-5
-"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 
 
 def levels(outputs: tuple[str, ...], *, gusts: bool) -> tuple[str, ...]:
@@ -239,20 +239,17 @@ def records_by_terms(
     if measured:
         u.append(surplus_inputs(batch, scale, known, options))
     corners = [servo_bend(batch.channels[name]) for name in CONTROLS]
-    floor = _FLOOR * y.std(axis=1)
-    least = tuple(Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs))
+    least = floor_terms(outputs, y)
     y = y - y[:, :1]
     made = []
     for terms in choices:
         inputs = np.concatenate([*u, term_inputs(batch, known, terms, at)], axis=2)
-        edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
-        bend = np.zeros_like(inputs)
-        bend[:, 1:] = (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
+        bend = smooth_bend(inputs, 1)
         for number, corner in enumerate(corners):
             bend[:, :, number] += corner
         own = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured, terms=terms)
-        own = Predictor(**{**vars(own), "terms": (*own.terms, *least)})
-        made.append(Records(batch.dt_s, KalmanSignals(y, inputs, bend), layout(own, y.shape[0]), scale))
+        signals = KalmanSignals(y, inputs, np.ascontiguousarray(bend))
+        made.append(Records(batch.dt_s, signals, layout(extended(own, least), y.shape[0]), scale))
     return made
 
 

@@ -28,12 +28,19 @@ from airtruth.identification.likelihood.options import (
     free_parameters,
     prior_weights,
 )
-from airtruth.identification.likelihood.predictor import LevelLayout, Term, extended, layout, short_period
+from airtruth.identification.likelihood.predictor import (
+    LevelLayout,
+    Term,
+    extended,
+    floor_terms,
+    layout,
+    short_period,
+)
 from airtruth.identification.likelihood.pressure import products, with_pressure, with_trim_moment
 from airtruth.identification.likelihood.scoring import Maxima, Scored, Search, maximise
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
-from airtruth.numerics.intersample import decay_of, servo_bend
+from airtruth.numerics.intersample import decay_of, servo_bend, smooth_bend
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import Scale
 
@@ -42,8 +49,6 @@ Ints = NDArray[np.int64]
 
 MOMENT_NOISE: Final = "noise_moment"
 """Name of the parameter: intensity of the noise in q_dot [rad/s per root second]."""
-_FLOOR: Final = 1e-5
-"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 
 
 @dataclass(frozen=True)
@@ -89,14 +94,12 @@ def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) 
         predictor = extended(predictor, [Term("Q", "q", "", 1.0, noise * 2)], (), (), noise, noise)
     if options.trim_moment_prior is not None:
         predictor = with_trim_moment(predictor, scale)
-    floor = _FLOOR * y.std(axis=1)
-    least = [Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(options.outputs)]
-    edge = np.concatenate([u[:, :1], u, u[:, -1:]], axis=1)
-    bend[:, 1:] += (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
     return Records(
         dt_s=batch.dt_s,
-        signals=KalmanSignals(y - y[:, :1], np.ascontiguousarray(u), np.ascontiguousarray(bend)),
-        layout=layout(extended(predictor, least), y.shape[0]),
+        signals=KalmanSignals(
+            y - y[:, :1], np.ascontiguousarray(u), np.ascontiguousarray(bend + smooth_bend(u, 1))
+        ),
+        layout=layout(extended(predictor, floor_terms(options.outputs, y)), y.shape[0]),
         scale=scale,
     )
 

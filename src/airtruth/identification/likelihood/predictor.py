@@ -45,6 +45,8 @@ _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
 
 W_SHARES: Final = {"w1": _W1, "w2": _W2}
 """Shares of the two states of a transverse gust in it, over its standard deviation [-]."""
+_FLOOR: Final = 1e-5
+"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 W_START: Final = ((1.0, 0.5), (0.5, 0.5))
 """Covariance of these states in a stationary gust [-]."""
 
@@ -248,6 +250,12 @@ def short_period(
         terms=tuple(t for t in terms if t.matrix not in "CDR" or t.row in outputs),
         start=((("u",), ((1.0,),)), (tuple(W_SHARES), W_START)),
     )
+
+
+def floor_terms(outputs: Sequence[str], y: Array) -> list[Term]:
+    """Least variance of the noise of measured outputs (runs, samples, outputs)."""
+    floor = _FLOOR * y.std(axis=1)
+    return [Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs)]
 
 
 def extended(

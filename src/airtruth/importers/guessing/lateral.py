@@ -22,6 +22,7 @@ from airtruth.checks.spectra import integral
 from airtruth.importers.guessing.evidence import (
     SlotFinding,
     SlotRelation,
+    changes,
     compared,
     effect,
     moved,
@@ -32,6 +33,8 @@ from airtruth.physics.motion import LATERAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
+
+_ROLLING, _YAWING = LATERAL.controls
 
 
 def _yawing(c: Mapping[str, Array]) -> Array:
@@ -76,12 +79,12 @@ def _turned(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
 
 def _rolls(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     others = [c[name] for name in ("p", "r", "beta") if name in c]
-    return moves(*effect(c["p"], [c["aileron"], *others], dt_s), 30.0, "the aileron changes p'")
+    return moves(*effect(c["p"], [c[_ROLLING.name], *others], dt_s), 30.0, changes(_ROLLING))
 
 
 def _yaws(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     others = [c[name] for name in ("r", "p", "beta" if "beta" in c else "ay") if name in c]
-    return moves(*effect(c["r"], [c["rudder"], *others], dt_s), 6.0, "the rudder changes r'")
+    return moves(*effect(c["r"], [c[_YAWING.name], *others], dt_s), 6.0, changes(_YAWING))
 
 
 def _centred(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
@@ -118,8 +121,8 @@ LATERAL_RELATIONS: Final = (
     SlotRelation(("psi", "r"), _HEADED, ("theta", "q", "phi")),
     SlotRelation(("beta", "ay", "phi", "r", "airspeed"), _SLIPPED, ("p", "theta", "alpha")),
     SlotRelation(("r", "phi", "ay", "airspeed"), _turned, ("p", "theta", "alpha", "beta")),
-    SlotRelation(("aileron", "p"), _rolls, ("r", "beta")),
-    SlotRelation(("rudder", "r"), _yaws, ("p", "beta", "ay")),
+    SlotRelation((_ROLLING.name, "p"), _rolls, ("r", "beta")),
+    SlotRelation((_YAWING.name, "r"), _yaws, ("p", "beta", "ay")),
     *(_commanded(control.name) for control in LATERAL.controls),
 )
 """Everything that is tested of the lateral-directional motion. A relation uses further slots where they are assigned."""
