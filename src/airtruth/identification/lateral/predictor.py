@@ -40,9 +40,8 @@ from airtruth.identification.likelihood.predictor import (
     extended,
     floor_terms,
     gust_terms,
-    kinematic_terms,
     layout,
-    signal_terms,
+    linear_terms,
 )
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
@@ -107,7 +106,7 @@ def predictor_of(
     """
     own, state_names = structure(scale), tuple(state.name for state in LATERAL.states)
     acting = list(actions(LATERAL, own, outputs))
-    made = kinematic_terms(LATERAL, own, outputs) + signal_terms(LATERAL, acting)
+    made = linear_terms(LATERAL, own, outputs, acting)
     made += [Term("B", row, name, 1.0) for row, name in zip(state_names, KINEMATIC, strict=True)]
     made += [
         Term(matrices[1], row, name, factor, (parameter,))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants, OneOrEach, each_batch, observe
-from airtruth.identification.estimates import JOINT, Estimates, S, mean_scale
+from airtruth.identification.estimates import JOINT, AnyScale, Estimates, S, mean_scale
 from airtruth.identification.likelihood.kalman import score
 from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
 from airtruth.identification.likelihood.options import (
@@ -41,7 +41,7 @@ from airtruth.identification.likelihood.scoring import Maxima, Scored, Search, m
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.intersample import decay_of, servo_bend, smooth_bend
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.short_period import Scale
 
 Array = NDArray[np.float64]
@@ -234,16 +234,24 @@ def scored(data: Records[S], z: Array, active: Ints, free: Ints, *, informed: bo
 
 
 def _estimates(maxima: Maxima, run_ids: tuple[str, ...], scale: Scale, options: FilterOptions) -> Estimates:
-    six = len(LONGITUDINAL.parameters)
     gusts = options.sigma_u_m_s > 0.0 or options.sigma_w_m_s > 0.0
+    return estimates_of(maxima, run_ids, scale, LONGITUDINAL, options.confidence, gusts)
+
+
+def estimates_of(
+    maxima: Maxima, run_ids: tuple[str, ...], scale: AnyScale, motion: Motion, confidence: float, gusts: bool
+) -> Estimates:
+    """Estimates of the derivatives of a motion, the first parameters; without gusts they are those of output error."""
+    count = len(motion.parameters)
     return Estimates(
         method="filter-error" if gusts else "output-error",
         run_ids=run_ids,
-        theta=maxima.z[:, :six],
-        covariance=maxima.covariance[:, :six, :six],
+        theta=maxima.z[:, :count],
+        covariance=maxima.covariance[:, :count, :count],
         covariance_name="fisher",
         status=maxima.status,
         iterations=maxima.iterations,
         scale=scale,
-        confidence=options.confidence,
+        confidence=confidence,
+        motion=motion,
     )

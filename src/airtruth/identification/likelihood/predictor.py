@@ -145,26 +145,22 @@ def actions(motion: Motion, own: Structure, outputs: Sequence[str]) -> Iterator[
                     yield Action(matrices, row, derivative, factor)
 
 
-def kinematic_terms(motion: Motion, own: Structure, outputs: Sequence[str]) -> list[Term]:
-    """Terms of a motion without derivatives; its first outputs are its states."""
-    states = tuple(state.name for state in motion.states)
+def linear_terms(
+    motion: Motion, own: Structure, outputs: Sequence[str], acting: Iterable[Action]
+) -> list[Term]:
+    """Terms of a motion in still air: kinematics, outputs that are states, and derivatives with their signals."""
+    states, controls = ([x.name for x in each] for each in (motion.states, motion.controls))
     made = [
         Term("A", row, column, own.kinematics[..., i, j])
         for i, row in enumerate(states)
         for j, column in enumerate(states)
         if own.kinematics[..., i, j].any()
     ]
-    return made + [Term("C", name, name, 1.0) for name in states if name in outputs]
-
-
-def signal_terms(motion: Motion, acting: Iterable[Action]) -> list[Term]:
-    """Terms of the derivatives with their signals, each of which is a state or a control."""
-    states, controls = ([x.name for x in each] for each in (motion.states, motion.controls))
-    made = []
+    made += [Term("C", name, name, 1.0) for name in states if name in outputs]
     for matrices, row, derivative, factor in acting:
         is_state, number = places(motion)[derivative.column]
-        signal = (states if is_state else controls)[number]
-        made.append(Term(matrices[0 if is_state else 1], row, signal, factor, (derivative.name,)))
+        matrix, names = (matrices[0], states) if is_state else (matrices[1], controls)
+        made.append(Term(matrix, row, names[number], factor, (derivative.name,)))
     return made
 
 
@@ -230,8 +226,7 @@ def short_period(
     v, own, (along, transverse) = scale.airspeed_m_s, structure(scale), LEVELS
     acting = list(actions(LONGITUDINAL, own, outputs))
     terms = [
-        *kinematic_terms(LONGITUDINAL, own, outputs),
-        *signal_terms(LONGITUDINAL, acting),
+        *linear_terms(LONGITUDINAL, own, outputs, acting),
         *gust_terms(LONGITUDINAL, acting, outputs, v, length_w_m, transverse),
         Term("A", "u", "u", -v / length_u_m),
         Term("Q", "u", "", 2.0 * v / length_u_m),
