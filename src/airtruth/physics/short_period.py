@@ -124,13 +124,9 @@ def linear_system(theta: Array, s: Scale) -> Linear:
     ----------
     theta : (..., 6) derivatives [-]; s : factors of shape (...).
     """
-    (a, b), row, states = system(theta, s), normal_force_row(theta, s), len(LONGITUDINAL.states)
-    own = structure(s)
-    c, d = (
-        np.zeros((*row.shape[:-1], *own.seen.shape)) + own.seen,
-        np.zeros((*row.shape[:-1], len(own.seen), 1)),
-    )
-    c[..., -1, :], d[..., -1, :] = row[..., :states], row[..., states:]
+    (a, b), row, seen = system(theta, s), normal_force_row(theta, s)[..., None, :], np.eye(2)
+    c = np.concatenate([np.zeros_like(a) + seen, row[..., :-1]], axis=-2)
+    d = np.concatenate([np.zeros_like(b[..., None]), row[..., -1:]], axis=-2)
     return Linear(a, b[..., None], c, d)
 
 

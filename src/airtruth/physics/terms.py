@@ -58,10 +58,6 @@ def coefficients_of(motion: Motion) -> tuple[str, ...]:
 
 SIGNALS: Final = signals_of(LONGITUDINAL)
 """`signals_of` the pitch plane."""
-DRIVERS: Final = drivers_of(LONGITUDINAL)
-"""`drivers_of` the pitch plane."""
-FACTORS: Final = factors_of(LONGITUDINAL)
-"""`factors_of` the pitch plane."""
 READINGS: Final = LONGITUDINAL.output_channels
 """Outputs of the filter of the pitch plane."""
 OUTPUTS: Final = frozenset(channel for m in MOTIONS.values() for channel in m.output_channels)
