@@ -45,29 +45,51 @@ HOMONYMS = {
         "numerics/levenberg_marquardt_options.py",
         "tracing/inference/optimise.py",
     ),
+    "size": (
+        "charts/ticks.py",
+        "design/waveforms.py",
+        "identification/lateral/frequency.py",
+        "identification/lateral/observation.py",
+        "identification/lateral/problems.py",
+        "identification/likelihood/filter_slopes.py",
+        "identification/likelihood/kalman.py",
+        "importers/held.py",
+        "loop/result.py",
+        "numerics/intersample.py",
+        "numerics/prefilter.py",
+        "physics/dryden.py",
+        "physics/reconstruction.py",
+        "reporting/campaign.py",
+        "reporting/partial.py",
+        "simulation/survey/controls.py",
+        "tracing/model/ahead.py",
+        "tracing/model/compile.py",
+        "tracing/model/response_slopes.py",
+        "tracing/model/surface_path.py",
+    ),
 }
-"""Word -> modules in which it is not the word of an axis."""
+"""Word, or "size" of three or six -> modules in which it is not that of an axis."""
 CAPS: dict[str, int] = {
-    "aircraft": 128,
-    "airtruth": 22,
+    "aircraft": 123,
+    "airtruth": 13,
     "api": 2,
-    "charts": 1,
-    "checks": 43,
+    "charts": 0,
+    "checks": 37,
     "cli": 16,
-    "design": 35,
+    "design": 34,
     "exporting": 0,
-    "identification": 58,
-    "importers": 53,
+    "identification": 53,
+    "importers": 52,
     "logs": 1,
-    "loop": 1,
-    "numerics": 4,
-    "physics": 122,
-    "reporting": 18,
-    "simulation": 89,
+    "loop": 0,
+    "numerics": 0,
+    "physics": 120,
+    "reporting": 15,
+    "simulation": 84,
     "starting": 19,
     "tracing/anomalies": 0,
     "tracing/inference": 0,
-    "tracing/model": 227,
+    "tracing/model": 205,
     "tracing/presentation": 4,
     "tracing/selection": 5,
     "tracing": 35,
@@ -134,7 +156,7 @@ def count(path: Path) -> int:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     other = {word for word, modules in HOMONYMS.items() if path.as_posix().endswith(modules)}
     found = (name for w in words(tree) for name in (*NAMES.findall(w), *COEFFICIENTS.intersection({w})))
-    return sizes(tree) + sum(name not in other for name in found)
+    return ("size" not in other) * sizes(tree) + sum(name not in other for name in found)
 
 
 def counts() -> Counter[str]:
