@@ -1,6 +1,10 @@
 """A ratchet: derivatives, channels and axes are named where a motion is described, and ever less elsewhere.
 
 No room may exceed its cap. Lower the cap of a room whose count has fallen; the test prints the total.
+
+Two words of an axis have other meanings, and the modules of `HOMONYMS` use them in these alone. A moment is also a moment of
+statistics: a sum of products whose roots are estimates. In four modules it is the kind of every coefficient with a reference
+length, whatever its motion. A chord is also a step of Newton's method with the derivatives of an earlier one.
 """
 
 import ast
@@ -22,30 +26,73 @@ HOME = (
     "identification/regression/",
 )
 """Modules that describe an axis or hold its algebra: motions, parts of the aircraft, effects and estimators."""
+HOMONYMS = {
+    "moment": (
+        "aircraft/jsbsim/lateral_axes.py",
+        "checks/kinematics_fit.py",
+        "checks/kinematics_search.py",
+        "checks/spectra.py",
+        "identification/lateral/problems.py",
+        "identification/lateral/solve.py",
+        "identification/likelihood/cramer_rao.py",
+        "tracing/anomalies/families.py",
+        "tracing/inference/posterior.py",
+        "tracing/model/declared.py",
+        "tracing/model/surface_noise.py",
+    ),
+    "chord": (
+        "numerics/levenberg_marquardt.py",
+        "numerics/levenberg_marquardt_options.py",
+        "tracing/inference/optimise.py",
+    ),
+    "size": (
+        "charts/ticks.py",
+        "design/waveforms.py",
+        "identification/lateral/frequency.py",
+        "identification/lateral/observation.py",
+        "identification/lateral/problems.py",
+        "identification/likelihood/filter_slopes.py",
+        "identification/likelihood/kalman.py",
+        "importers/held.py",
+        "loop/result.py",
+        "numerics/intersample.py",
+        "numerics/prefilter.py",
+        "physics/dryden.py",
+        "physics/reconstruction.py",
+        "reporting/campaign.py",
+        "reporting/partial.py",
+        "simulation/survey/controls.py",
+        "tracing/model/ahead.py",
+        "tracing/model/compile.py",
+        "tracing/model/response_slopes.py",
+        "tracing/model/surface_path.py",
+    ),
+}
+"""Word, or "size" of three or six -> modules in which it is not that of an axis."""
 CAPS: dict[str, int] = {
-    "aircraft": 130,
-    "airtruth": 22,
+    "aircraft": 123,
+    "airtruth": 13,
     "api": 2,
-    "charts": 1,
-    "checks": 86,
+    "charts": 0,
+    "checks": 37,
     "cli": 16,
-    "design": 49,
+    "design": 34,
     "exporting": 0,
-    "identification": 218,
-    "importers": 74,
-    "logs": 2,
-    "loop": 1,
-    "numerics": 17,
-    "physics": 123,
-    "reporting": 18,
-    "simulation": 94,
+    "identification": 53,
+    "importers": 52,
+    "logs": 1,
+    "loop": 0,
+    "numerics": 0,
+    "physics": 120,
+    "reporting": 15,
+    "simulation": 84,
     "starting": 19,
-    "tracing/anomalies": 2,
-    "tracing/inference": 3,
-    "tracing/model": 243,
+    "tracing/anomalies": 0,
+    "tracing/inference": 0,
+    "tracing/model": 205,
     "tracing/presentation": 4,
     "tracing/selection": 5,
-    "tracing": 51,
+    "tracing": 35,
 }
 """Room -> occurrences in its code."""
 
@@ -107,7 +154,9 @@ def is_size(node: ast.expr | None) -> bool:
 
 def count(path: Path) -> int:
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    return sizes(tree) + sum(len(NAMES.findall(w)) + (w in COEFFICIENTS) for w in words(tree))
+    other = {word for word, modules in HOMONYMS.items() if path.as_posix().endswith(modules)}
+    found = (name for w in words(tree) for name in (*NAMES.findall(w), *COEFFICIENTS.intersection({w})))
+    return ("size" not in other) * sizes(tree) + sum(name not in other for name in found)
 
 
 def counts() -> Counter[str]:

@@ -7,6 +7,7 @@ positive, aileron (right - left)/2 with each trailing edge down positive, rudder
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from airtruth import units
@@ -42,100 +43,49 @@ class LogChannel:
         return self.name.removesuffix("_" + self.unit.replace("/", "_"))
 
 
+_DENSE: Final = units.SLUG / units.FT**3
+"""Unit of a density in JSBSim [kg/m3]."""
+_angle = partial(LogChannel, unit="rad", dimension="angle")
+_rate = partial(LogChannel, unit="rad/s", dimension="angular_rate", limit=10.0)
+_force = partial(LogChannel, unit="m/s2", dimension="acceleration", limit=200.0)
+
+
+def _deflections(surface: str, what: str, actuators: str, sense: str) -> tuple[LogChannel, LogChannel]:
+    """A control surface, and its command."""
+    sent = f"{surface} command sent to the {actuators}{sense}"
+    return (
+        _angle(f"{surface}_rad", description=f"{surface} surface{what}{sense}", limit=1.6),
+        _angle(f"{surface}_command_rad", description=sent, limit=1.6),
+    )
+
+
 _LONGITUDINAL = (
     LogChannel("airspeed_m_s", "m/s", "speed", "true airspeed", "velocities/vt-fps", units.FT, 1000.0),
-    LogChannel("alpha_rad", "rad", "angle", "angle of attack, nose-up positive", "aero/alpha-rad", limit=1.6),
-    LogChannel(
-        "theta_rad", "rad", "angle", "pitch attitude, nose-up positive", "attitude/theta-rad", limit=1.6
+    _angle("alpha_rad", description="angle of attack, nose-up positive", jsbsim="aero/alpha-rad", limit=1.6),
+    _angle(
+        "theta_rad", description="pitch attitude, nose-up positive", jsbsim="attitude/theta-rad", limit=1.6
     ),
-    LogChannel(
-        "q_rad_s",
-        "rad/s",
-        "angular_rate",
-        "body pitch rate, nose-up positive",
-        "velocities/q-rad_sec",
-        limit=10.0,
-    ),
-    LogChannel("ax_m_s2", "m/s2", "acceleration", "specific force along body x (forward)", limit=200.0),
-    LogChannel(
-        "az_m_s2",
-        "m/s2",
-        "acceleration",
-        "specific force along body z (down); level flight about -9.8",
-        limit=200.0,
-    ),
-    LogChannel(
-        "elevator_rad",
-        "rad",
-        "angle",
-        "elevator surface, mean of all; trailing edge down positive",
-        limit=1.6,
-    ),
-    LogChannel(
-        "elevator_command_rad",
-        "rad",
-        "angle",
-        "elevator command sent to the actuator; trailing edge down positive",
-        limit=1.6,
-    ),
+    _rate("q_rad_s", description="body pitch rate, nose-up positive", jsbsim="velocities/q-rad_sec"),
+    _force("ax_m_s2", description="specific force along body x (forward)"),
+    _force("az_m_s2", description="specific force along body z (down); level flight about -9.8"),
+    *_deflections("elevator", ", mean of all", "actuator", "; trailing edge down positive"),
     LogChannel("throttle", "-", "ratio", "throttle lever, 0 to 1", limit=1.0),
     LogChannel("altitude_m", "m", "length", "pressure altitude", "position/h-sl-ft", units.FT, 30000.0),
-    LogChannel(
-        "density_kg_m3",
-        "kg/m3",
-        "density",
-        "air density",
-        "atmosphere/rho-slugs_ft3",
-        units.SLUG / units.FT**3,
-        2.0,
-    ),
+    LogChannel("density_kg_m3", "kg/m3", "density", "air density", "atmosphere/rho-slugs_ft3", _DENSE, 2.0),
 )
+_AILERON = _deflections("aileron", "", "actuators", ", (right - left)/2, each trailing edge down positive")
+_RUDDER = _deflections("rudder", "", "actuator", ", trailing edge left positive")
 _LATERAL = (
-    LogChannel(
-        "beta_rad", "rad", "angle", "sideslip, wind from the right positive", "aero/beta-rad", limit=1.6
+    _angle(
+        "beta_rad", description="sideslip, wind from the right positive", jsbsim="aero/beta-rad", limit=1.6
     ),
-    LogChannel(
-        "p_rad_s",
-        "rad/s",
-        "angular_rate",
-        "body roll rate, right wing down positive",
-        "velocities/p-rad_sec",
-        limit=10.0,
-    ),
-    LogChannel(
-        "r_rad_s",
-        "rad/s",
-        "angular_rate",
-        "body yaw rate, nose right positive",
-        "velocities/r-rad_sec",
-        limit=10.0,
-    ),
+    _rate("p_rad_s", description="body roll rate, right wing down positive", jsbsim="velocities/p-rad_sec"),
+    _rate("r_rad_s", description="body yaw rate, nose right positive", jsbsim="velocities/r-rad_sec"),
     # of the angles of bank and heading whole turns are added up where they jump
-    LogChannel("phi_rad", "rad", "angle", "bank, right wing down positive", "attitude/phi-rad"),
-    LogChannel("psi_rad", "rad", "angle", "heading, nose right positive", "attitude/psi-rad"),
-    LogChannel("ay_m_s2", "m/s2", "acceleration", "specific force along body y (right)", limit=200.0),
-    LogChannel(
-        "aileron_rad",
-        "rad",
-        "angle",
-        "aileron surface, (right - left)/2, each trailing edge down positive",
-        limit=1.6,
-    ),
-    LogChannel("rudder_rad", "rad", "angle", "rudder surface, trailing edge left positive", limit=1.6),
-    LogChannel(
-        "aileron_command_rad",
-        "rad",
-        "angle",
-        "aileron command sent to the actuators, (right - left)/2, each trailing edge down positive",
-        limit=1.6,
-    ),
-    LogChannel(
-        "rudder_command_rad",
-        "rad",
-        "angle",
-        "rudder command sent to the actuator, trailing edge left positive",
-        limit=1.6,
-    ),
+    _angle("phi_rad", description="bank, right wing down positive", jsbsim="attitude/phi-rad"),
+    _angle("psi_rad", description="heading, nose right positive", jsbsim="attitude/psi-rad"),
+    _force("ay_m_s2", description="specific force along body y (right)"),
+    *(channel for pair in zip(_AILERON, _RUDDER, strict=True) for channel in pair),
 )
 
 SIGNALS: Final[dict[str, LogChannel]] = {s.name: s for s in (*_LONGITUDINAL, *_LATERAL)}

@@ -13,10 +13,7 @@ from airtruth.channels import BANK
 from airtruth.checks.kinematics_findings import bias_of, concluded, drift, errors_of
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, LongitudinalSamples, thinned
-from airtruth.checks.kinematics_record import (
-    USUAL_ARM_M,
-    records_of,
-)
+from airtruth.checks.kinematics_record import USUAL_ARM_M, records_of
 from airtruth.checks.kinematics_search import ErrorSearch, completed, search
 from airtruth.checks.kinematics_vaneless import COMPUTED, WITHOUT_ATTITUDE, untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED
@@ -193,8 +190,4 @@ def _scale_or_bias(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
     return tuple(both.get(f.name, f) for f in findings)
 
 
-__all__ = [
-    "AIRSPEED",
-    "NAMED",
-    "check_kinematics",
-]
+__all__ = ["AIRSPEED", "NAMED", "check_kinematics"]

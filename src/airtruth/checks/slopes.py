@@ -110,24 +110,20 @@ def _aerodynamic_tests(runs: Runs, aircraft: Aircraft) -> list[Relation]:
     pressure, lines = runs.each(dynamic), runs.lines()
     pressure = np.append(pressure, pressure.mean())
     area = aircraft.wing_area_m2
-    lift = regress(runs.spectra_of(NORMAL)[:, 0], runs.spectra_of(*CAUSES), lines=lines)
-    to_lift = -aircraft.mass_kg / (pressure * area)
-    control = regress(runs.spectra_of(GYRO)[:, 0], runs.integrals_of(SURFACE, VANE, GYRO), lines=lines)
-    to_moment = aircraft.inertia_yy_kg_m2 / (pressure * area * aircraft.chord_m)
     declared = aircraft.file.derivatives
     result = []
     for name, factors, scale, tolerance, channels in (
         (
             LIFT_SLOPE,
-            lift,
-            to_lift,
+            regress(runs.spectra_of(NORMAL)[:, 0], runs.spectra_of(*CAUSES), lines=lines),
+            -aircraft.mass_kg / (pressure * area),
             LIFT_STD,
             ("airspeed_m_s", "density_kg_m3", VANE, NORMAL, SURFACE, GYRO),
         ),
         (
             CONTROL_POWER,
-            control,
-            to_moment,
+            regress(runs.spectra_of(GYRO)[:, 0], runs.integrals_of(SURFACE, VANE, GYRO), lines=lines),
+            aircraft.inertia_yy_kg_m2 / (pressure * area * aircraft.chord_m),
             MOMENT_STD,
             (SURFACE, "airspeed_m_s", "density_kg_m3", VANE, GYRO),
         ),

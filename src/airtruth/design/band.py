@@ -42,7 +42,7 @@ DRAWS: Final = 6
 """Draws of the derivatives and of the size behind a stated band [-] (judgement, as for a separation)."""
 _FIRST: Final = 2
 """Draws during the search [-] (judgement: a draw and its opposite)."""
-COEFFICIENTS: Final = ("CL", "Cm")
+COEFFICIENTS: Final = tuple(c.name for c in LONGITUDINAL.coefficients)
 """Coefficients whose increments are planned for."""
 _SPREAD: Final = 0.3
 """Relative standard deviation of the size of an increment in the draws [-] (judgement, as of an effect)."""
@@ -92,7 +92,7 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     table = accepted.table
     at = np.zeros(1) if table is None else _points(table)
     shape = Shape(
-        acts_on="Cm" if acts_on == "Cm" else "CL",
+        acts_on=acts_on if acts_on in COEFFICIENTS else COEFFICIENTS[0],
         signal=signal,
         low=float(at[0]),
         high=float(at[-1]),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
+from airtruth.design.planned_campaign import PlannedCampaign, draw_input
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
@@ -226,7 +226,7 @@ class NarrowResult(PlannedCampaign):
                 2 + len(self.targets), 1, width_in=6.5, height_in=4.0 + 2.0 * len(self.targets)
             )
             middle = axes[1, 0]
-            draw_elevator(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
+            draw_input(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
             middle.plot(p.t_s, p.alpha_rad / DEG, color=style.BLUE)
             middle.set_ylabel("alpha [deg]")
             middle.set_xlabel("time [s]")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth.design.limits import Extremes, Limits
 from airtruth.logs.atomic import write_text
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.campaign.write import as_toml
 from airtruth.simulation.simulator import Condition
@@ -79,19 +80,19 @@ class PlannedCampaign(ABC):
         write_text(out, self.to_toml())
 
 
-def draw_elevator(ax: Axes, t_s: Array, reference_rad: Array, elevator_rad: Array, family: str) -> None:
+def draw_input(ax: Axes, t_s: Array, reference_rad: Array, surface_rad: Array, family: str) -> None:
     """Draw the computed input beside the 3-2-1-1 of equal length; the caller draws the legend, where it hides neither.
 
     Parameters
     ----------
-    t_s, reference_rad, elevator_rad : (samples,) time [s] and both inputs [rad].
+    t_s, reference_rad, surface_rad : (samples,) time [s] and both inputs [rad].
     family : of the computed input.
     """
     from airtruth import style
 
     ax.plot(t_s, reference_rad / DEG, "--", color=style.GREY, label="3-2-1-1 of equal length")
-    ax.plot(t_s, elevator_rad / DEG, color=style.BLUE, label=family)
-    ax.set_ylabel("elevator [deg]")
+    ax.plot(t_s, surface_rad / DEG, color=style.BLUE, label=family)
+    ax.set_ylabel(f"{LONGITUDINAL.controls[0].name} [deg]")
 
 
-__all__ = ["PlannedCampaign", "draw_elevator"]
+__all__ = ["PlannedCampaign", "draw_input"]

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
+from airtruth.channels import shown
+from airtruth.design.planned_campaign import PlannedCampaign, draw_input
 from airtruth.design.separation import Member
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
@@ -26,10 +27,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_LABELS: Final = ("alpha [deg]", "q [deg/s]", "az [m/s2]")
-"""Names of the outputs in a figure."""
-_SCALES: Final = (1.0 / DEG, 1.0 / DEG, 1.0)
-"""Factors from SI to the units of `_LABELS`."""
 _TIE: Final = -2.0 * math.log(CRITERION.level)
 """Difference in 2 log L up to which two hypotheses explain the records equally well [-]."""
 
@@ -198,9 +195,9 @@ class SplitResult(PlannedCampaign):
         p = self.prediction
         with style.applied():
             figure, axes = style.panels(4, 1, width_in=6.5, height_in=7.2, sharex=True)
-            draw_elevator(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
-            for k, label in enumerate(_LABELS):
-                ax, scale = axes[k + 1, 0], _SCALES[k]
+            draw_input(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
+            for k, (label, scale) in enumerate(map(shown, CHANNELS)):
+                ax = axes[k + 1, 0]
                 ax.axhspan(
                     -scale * p.noise[k], scale * p.noise[k], color="#EEEEEE", label="noise of a sample"
                 )
@@ -230,7 +227,5 @@ class SplitResult(PlannedCampaign):
     def _repr_html_(self) -> str:
         return as_html(self.table())
 
-
-assert len(_LABELS) == len(CHANNELS)
 
 __all__ = ["InputRow", "Prediction", "SplitResult", "split_probability"]

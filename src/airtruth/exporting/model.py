@@ -56,9 +56,7 @@ Matrices = tuple[Array, Array, Array, Array]
 def _short_period(theta: Array, at: FlightPoint) -> Matrices:
     """M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2) and (3); az in m/s2."""
     scale = short_period.scale_of(at.constants, at.airspeed_m_s, at.density_kg_m3)
-    a, b = short_period.system(theta, scale)
-    row = short_period.normal_force_row(theta, scale)
-    return a, b[:, None], np.vstack([np.eye(2), row[:2]]), np.array([[0.0], [0.0], [row[2]]])
+    return short_period.linear_system(theta, scale)
 
 
 def _lateral(theta: Array, at: FlightPoint) -> Matrices:

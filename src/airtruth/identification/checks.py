@@ -57,8 +57,8 @@ def check_channels(log: FlightLog, methods: Sequence[Method], motion: Motion = L
             )
     if motion is LATERAL and not {LATERAL.vane, *ATTITUDE[1:]} & set(log.channels):
         raise LogError(
-            "the lateral motion needs beta_rad, or phi_rad or psi_rad to reconstruct it, and the log has none of them; map one "
-            "on import"
+            f"the lateral motion needs {LATERAL.vane}, or {' or '.join(ATTITUDE[1:])} to reconstruct it, and the log has none of "
+            "them; map one on import"
         )
     for chosen in methods:
         for name in chosen.channels:

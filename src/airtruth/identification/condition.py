@@ -21,6 +21,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import BANK
 from airtruth.identification.lateral_inputs import lateral_inputs
 from airtruth.identification.options import Options
 from airtruth.identification.regression.rows import row_factors
@@ -152,7 +153,7 @@ def across_path(batch: Batch) -> Array:
     alpha, theta = batch.channels[LONGITUDINAL.vane], batch.channels.get("theta_rad")
     if theta is None:
         return np.ones_like(alpha)
-    bank = batch.channels.get("phi_rad", np.zeros_like(alpha))
+    bank = batch.channels.get(BANK, np.zeros_like(alpha))
     cosine = np.cos(theta - alpha) - (1.0 - np.cos(bank)) * np.cos(theta) * np.cos(alpha)
     return np.where(_range(cosine, batch.dt_s)[:, None] > _LEVEL, cosine, 1.0)
 

@@ -30,6 +30,8 @@ from airtruth.logs.flight_log import Batch
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+EQUATIONS: Final = len((LIFT, MOMENT, NORMAL))
+"""Number of the equations."""
 WEAK: Final = 7.03
 """Stock and Yogo's critical value for two endogenous regressors and two instruments [-]: below it a nominal
 5 % test may reject in 10 % of the cases (their table 5.2)."""
@@ -91,8 +93,8 @@ def diagnose(
     reach = int(min(_CROSS_LAG_S / batch.dt_s, batch.t_s.shape[1] // 4))
     lags = np.arange(-reach, reach + 1)
     scalars = np.full((4, runs), np.nan)
-    threes = np.full((3, runs, 3), np.nan)
-    cross = np.full((runs, 3, lags.size), np.nan)
+    threes = np.full((3, runs, EQUATIONS), np.nan)
+    cross = np.full((runs, EQUATIONS, lags.size), np.nan)
     first = 0
     for part in chunks(batch):
         observation = observe(part, constants, options)
@@ -102,8 +104,7 @@ def diagnose(
         known = np.flatnonzero(np.isfinite(theta).all(axis=1))
         known = known[problem.usable(theta[known], known)]
         at = first + known
-        elevator = observation.signals[:, ELEVATOR]
-        scalars[0, first : first + size] = elevator.std(axis=1)
+        scalars[0, first : first + size] = observation.signals[:, ELEVATOR].std(axis=1)
         if known.size:
             rows = problem.rows(theta[known], known)
             projected = project(rows, theta[known], observation.factors[known], options.trim == "intercept")
@@ -152,7 +153,7 @@ def residuals(
         theta = estimates.theta[first : first + len(part.run_ids)]
         known = np.flatnonzero(np.isfinite(theta).all(axis=1))
         rows = problem.rows(theta[known], known)
-        e = np.full((theta.shape[0], 3, rows.shape[2]), np.nan)
+        e = np.full((theta.shape[0], EQUATIONS, rows.shape[2]), np.nan)
         e[known] = project(rows, theta[known], observation.factors[known], options.trim == "intercept").e
         parts.append(e)
         first += len(part.run_ids)
@@ -245,7 +246,7 @@ def cross_correlation(p: Projected, factors: Array, lags: Ints) -> Array:
     """
     samples = p.e.shape[2]
     transform = int(next_fast_len(2 * samples - 1, real=True))
-    result = np.empty((p.e.shape[0], 3, lags.size))
+    result = np.empty((*p.e.shape[:-1], lags.size))
     for r in range(p.e.shape[0]):
         z, x, trim = p.z[r], p.x[r], p.trim[r]
         shifted = np.stack([_shift(p.z[r, 2], int(lag)) for lag in lags])
@@ -256,7 +257,7 @@ def cross_correlation(p: Projected, factors: Array, lags: Ints) -> Array:
         lift, normal = factors[r, LIFT], factors[r, NORMAL]
         both = lift**2 + normal**2
         own = (lift**2 / both, 1.0, normal**2 / both)
-        for i in range(3):
+        for i in range(EQUATIONS):
             series = (by_shift - own[i] * by_hat) * e[i].conj()
             if i != MOMENT:
                 other = NORMAL if i == LIFT else LIFT

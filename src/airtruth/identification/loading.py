@@ -61,7 +61,7 @@ def at_one_cg(made: Mapping[float | None, Estimates], reference: float | None) -
         return replace(
             bad, theta=np.full_like(bad.theta, np.nan), covariance=nothing, status=status, scale=scale
         )
-    information, right = np.zeros((6, 6)), np.zeros(6)
+    information, right = np.zeros_like(parts[0].covariance[0]), np.zeros_like(parts[0].theta[0])
     for cg, part in made.items():
         assert cg is not None
         to_own = cg_transfer(cg - reference)

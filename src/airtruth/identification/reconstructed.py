@@ -16,6 +16,7 @@ import numpy as np
 from airtruth.identification.estimates import Estimates
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.reconstruction import COLUMNS, is_reconstructed
 
 
@@ -46,8 +47,9 @@ def with_reconstruction(
 def _disturbed(batch: Batch, name: str) -> Batch:
     if name not in batch.channels:
         return batch
-    alpha = np.ascontiguousarray(batch.channels["alpha_rad"] + batch.channels[name])
-    return replace(batch, channels={**batch.channels, "alpha_rad": alpha})
+    vane = LONGITUDINAL.vane
+    angle = np.ascontiguousarray(batch.channels[vane] + batch.channels[name])
+    return replace(batch, channels={**batch.channels, vane: angle})
 
 
 __all__ = ["with_reconstruction"]

@@ -32,7 +32,7 @@ from airtruth.logs.histories import Histories, History
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
-from airtruth.physics.short_period import Scale, normal_force_row, scale_of, system
+from airtruth.physics.short_period import Scale, linear_system, scale_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +47,7 @@ _LARGEST: Final = 1e6
 """Largest derivative that is simulated [1/rad] (judgement: beyond any aircraft)."""
 
 
-def simulate(theta: Array, s: Scale, dt_s: float, elevator_rad: Array, measured: Array) -> Array:
+def simulate(theta: Array, s: Scale, dt_s: float, surface_rad: Array, measured: Array) -> Array:
     """Outputs of the linear short period for a record, its initial state, trim and az offset fitted.
 
     Parameters
@@ -55,7 +55,7 @@ def simulate(theta: Array, s: Scale, dt_s: float, elevator_rad: Array, measured:
     theta : (6,) derivatives in the order of `LONGITUDINAL.parameters` [1/rad, rates as q c/(2V)].
     s : factors of the flight condition, scalars.
     dt_s : sample period [s].
-    elevator_rad : (samples,) elevator, linear between samples [rad].
+    surface_rad : (samples,) surface, linear between samples [rad].
     measured : (samples, 3) alpha [rad], q [rad/s], az [m/s2].
 
     Returns
@@ -63,36 +63,32 @@ def simulate(theta: Array, s: Scale, dt_s: float, elevator_rad: Array, measured:
     (samples, 3)
         Simulated outputs in the same units; NaN where the motion diverges.
     """
-    a, b = system(theta, s)
-    elevator = elevator_rad - elevator_rad[0]
-    step = expm(
-        dt_s
-        * np.block(
-            [[a, b[:, None], np.zeros((2, 1))], [np.zeros((1, 3)), np.ones((1, 1))], [np.zeros((1, 4))]]
-        )
-    )
-    phi, early = step[:2, :2], step[:2, 2]
-    late = step[:2, 3] / dt_s  # of the change of the elevator over the step
-    # columns: forced motion, two initial states, two constants that trim the equations
-    x = np.zeros((len(elevator), 2, 5))
-    x[0, :, 1:3] = np.eye(2)
-    constant = _integral(a, dt_s)
+    model, surface = linear_system(theta, s), surface_rad - surface_rad[0]
+    states, outputs = len(model.a), len(model.c)
+    driven = np.zeros((states + 2, states + 2))  # states, surface and its rate
+    driven[:states, :states], driven[:states, states] = model.a, model.b[:, 0]
+    driven[states, states + 1] = 1.0
+    step = expm(dt_s * driven)
+    phi, early = step[:states, :states], step[:states, states]
+    late = step[:states, states + 1] / dt_s  # of the change of the surface over the step
+    # columns: forced motion, initial states, constants that trim the equations
+    x = np.zeros((len(surface), states, 1 + 2 * states))
+    x[0, :, 1 : 1 + states] = np.eye(states)
+    constant = _integral(model.a, dt_s)
     with np.errstate(over="ignore", invalid="ignore"):
-        for k in range(len(elevator) - 1):
+        for k in range(len(surface) - 1):
             x[k + 1] = phi @ x[k]
-            x[k + 1, :, 0] += early * elevator[k] + late * (elevator[k + 1] - elevator[k])
-            x[k + 1, :, 3:] += constant
-        row = normal_force_row(theta, s)
-        az = np.einsum("i,nij->nj", row[:2], x)
-        az[:, 0] += row[2] * elevator
-        basis = np.concatenate([x, az[:, None, :]], axis=1)  # (samples, 3, 5)
+            x[k + 1, :, 0] += early * surface[k] + late * (surface[k + 1] - surface[k])
+            x[k + 1, :, 1 + states :] += constant
+        basis = np.einsum("oi,nij->noj", model.c, x)  # (samples, outputs, columns)
+        basis[..., 0] += model.d[:, 0] * surface[:, None]
     offset = np.zeros((*basis.shape[:2], 1))
-    offset[:, 2] = 1.0
+    offset[:, -1] = 1.0
     basis = np.concatenate([basis, offset], axis=2)
     if not np.isfinite(basis).all():
         return np.full_like(measured, np.nan)
     weight = 1.0 / np.maximum(measured.std(axis=0), np.finfo(np.float64).tiny)
-    columns = (basis * weight[None, :, None]).reshape(-1, 6)
+    columns = (basis * weight[None, :, None]).reshape(len(surface) * outputs, -1)
     target = (measured * weight).reshape(-1) - columns[:, 0]
     size = np.maximum(np.linalg.norm(columns[:, 1:], axis=0), np.finfo(np.float64).tiny)
     free = np.linalg.lstsq(columns[:, 1:] / size, target, rcond=None)[0] / size
@@ -100,8 +96,11 @@ def simulate(theta: Array, s: Scale, dt_s: float, elevator_rad: Array, measured:
 
 
 def _integral(a: Array, dt_s: float) -> Array:
-    """Integral of exp(A t) over a sample period, (2, 2)."""
-    return np.asarray(expm(dt_s * np.block([[a, np.eye(2)], [np.zeros((2, 4))]]))[:2, 2:])
+    """Integral of exp(A t) over a sample period, (states, states)."""
+    states = len(a)
+    whole = np.zeros((2 * states, 2 * states))
+    whole[:states, :states], whole[:states, states:] = a, np.eye(states)
+    return np.asarray(expm(dt_s * whole)[:states, states:])
 
 
 def spaced(runs: int, most: int = MOST_RECORDS) -> list[int]:

@@ -19,16 +19,17 @@ from numpy.typing import NDArray
 from airtruth.errors import LogError
 from airtruth.importers.series import Series
 from airtruth.importers.uniform import low_passed
+from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
 
 PREFERRED: Final = (
-    "q_rad_s",
-    "az_m_s2",
-    "elevator_rad",
-    "elevator_command_rad",
+    *LONGITUDINAL.gyros,
+    LONGITUDINAL.outputs[-1].channel,
+    *LONGITUDINAL.surfaces,
+    *LONGITUDINAL.commands,
     "theta_rad",
-    "alpha_rad",
+    LONGITUDINAL.vane,
     "ax_m_s2",
     "airspeed_m_s",
     "altitude_m",

@@ -19,6 +19,7 @@ from airtruth.importers.runs import require_rows, runs_of
 from airtruth.importers.uniform import beyond, jitter_of, shortened, slower, uniform
 from airtruth.logs.flight_log import RECORD_CONSTANTS, RESAMPLED, FlightLog
 from airtruth.logs.validate import JITTER
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -77,7 +78,7 @@ def built(merged: Merged) -> FlightLog:
     if lost:
         metadata[_SHORTENED] = lost
     if drifts:
-        metadata["reconstructed"] = {"alpha_rad": {"drift_std_deg": float(np.median(drifts)) / DEG}}
+        metadata["reconstructed"] = {LONGITUDINAL.vane: {"drift_std_deg": float(np.median(drifts)) / DEG}}
     return FlightLog(
         metadata=metadata,
         run_ids=tuple(ids),

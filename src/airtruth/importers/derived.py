@@ -20,6 +20,7 @@ from airtruth.physics.atmosphere import (
     true_airspeed_m_s,
     true_airspeed_of_calibrated_m_s,
 )
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.reconstruction import COLUMNS, NEEDED, ReconstructionPriors, reconstruct
 from airtruth.units import DEG
 
@@ -112,7 +113,7 @@ def with_alpha(
         channels, dt_s, ReconstructionPriors(stated.az_bias_m_s2, q_std, stated.airspeed_error)
     )
     errors = dict(zip(COLUMNS, made.directions_rad, strict=True))
-    return {**channels, "alpha_rad": made.alpha_rad, **errors}, made.drift_std_rad
+    return {**channels, LONGITUDINAL.vane: made.alpha_rad, **errors}, made.drift_std_rad
 
 
 __all__ = ["PRESSURE", "with_air_data", "with_alpha"]

@@ -23,7 +23,7 @@ from airtruth.importers.channel_table import (
     Unit,
     unit_factor,
 )
-from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.quantity import Strict, explain
 
 CONSTANTS: Final[dict[str, str]] = {
@@ -240,7 +240,7 @@ class MappingFile(Strict):
             )
         if "air_temperature_k" in given and "density_kg_m3" in given:
             raise ValueError("channels.air_temperature_k gives density_kg_m3; keep one of the two")
-        if self.reconstruct.alpha and "alpha_rad" in given:
+        if self.reconstruct.alpha and LONGITUDINAL.vane in given:
             raise ValueError(
                 "[reconstruct] alpha replaces a missing vane; leave channels.alpha_rad out, or it"
             )
@@ -249,7 +249,7 @@ class MappingFile(Strict):
             raise ValueError(f"channels.{angles[0]} is computed from [attitude]; keep one of the two")
         if self.body_velocity is None:
             return
-        if speeds and "alpha_rad" in given:
+        if speeds and LONGITUDINAL.vane in given:
             raise ValueError(
                 f"[body_velocity] gives airspeed_m_s and alpha_rad, and channels.{speeds[0]} and channels.alpha_rad are "
                 "stated; leave one out"

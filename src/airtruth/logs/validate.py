@@ -110,7 +110,7 @@ def _missing(log: FlightLog) -> Iterator[str]:
             step = f"the nearest column is {near[0]!r}: map it" if near else "map a column to it"
             if not near:
                 controls = [one.channel for one in LONGITUDINAL.controls]
-                step += _NO_VANE if name == "alpha_rad" else _SERVO if name in controls else ""
+                step += _NO_VANE if name == LONGITUDINAL.vane else _SERVO if name in controls else ""
             yield f"{name}: required channel is missing ({SIGNALS[name].description}); {step} on import"
     if "density_kg_m3" not in log.channels and "altitude_m" not in log.channels:
         yield "density_kg_m3 or altitude_m: one of the two is required, both are missing; map one on import"

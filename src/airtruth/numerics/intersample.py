@@ -1,8 +1,8 @@
-"""Motion of an elevator between samples that a smooth interpolation misses.
+"""Motion of a control surface between samples that a smooth interpolation misses.
 
 A servo of first order behind a held command moves in exponentials that meet in corners. Smooth
 interpolation misses the area under a corner, to which the moment derivatives are as sensitive as to the
-elevator itself (0.5 % at 50 Hz). Only where the samples show such a servo its motion is reconstructed: with
+surface itself (0.5 % at 50 Hz). Only where the samples show such a servo its motion is reconstructed: with
 rho = exp(-dt/tau), the command that a cell implies is (de[k+1] - rho de[k])/(1 - rho), and it is constant
 except for a few steps.
 """
@@ -156,10 +156,10 @@ def _moving_cells(increments: Array, decays: Array, least: Array, moving: Array)
 
 
 @njit(cache=True, error_model="numpy")
-def _bends(elevator: Array, decay: Array, command: Array, bend: Array) -> None:
+def _bends(surface: Array, decay: Array, command: Array, bend: Array) -> None:
     cells = command.size
-    for run in range(elevator.shape[0]):
-        de, out, rho = elevator[run], bend[run], decay[run]
+    for run in range(surface.shape[0]):
+        de, out, rho = surface[run], bend[run], decay[run]
         if not _FASTEST < rho < _SLOWEST:
             continue
         low, high = math.inf, -math.inf
@@ -194,7 +194,16 @@ def _bends(elevator: Array, decay: Array, command: Array, bend: Array) -> None:
             out[k + 1] = mean - (13.0 * (start + end) - before - after) / 24.0
 
 
-def servo_bend(elevator: Array, noise_std_rad: float = 0.0, declared_decay: float = 0.0) -> Array:
+def smooth_bend(x: Array, axis: int = -1) -> Array:
+    """Mean of the cubic through the four nearest samples over the cell that ends at each sample, less that of its ends."""
+    u = np.moveaxis(x, axis, -1)
+    edge = np.concatenate([u[..., :1], u, u[..., -1:]], axis=-1)
+    bend = np.zeros_like(u)
+    bend[..., 1:] = (edge[..., 1:-2] + edge[..., 2:-1] - edge[..., :-3] - edge[..., 3:]) / 24.0
+    return np.moveaxis(bend, -1, axis)
+
+
+def servo_bend(surface: Array, noise_std_rad: float = 0.0, declared_decay: float = 0.0) -> Array:
     """Mean over the cell that ends at each sample: reconstructed servo motion minus the smooth hold.
 
     The smooth hold has the area of the cubic through the four nearest samples,
@@ -202,7 +211,7 @@ def servo_bend(elevator: Array, noise_std_rad: float = 0.0, declared_decay: floa
 
     Parameters
     ----------
-    elevator : (runs, samples) measured surface [rad].
+    surface : (runs, samples) measured surface [rad].
     noise_std_rad : standard deviation of its noise, where it is known [rad].
     declared_decay : decay of the declared servo over a sample period [-]; 0 for none.
 
@@ -210,8 +219,8 @@ def servo_bend(elevator: Array, noise_std_rad: float = 0.0, declared_decay: floa
     -------
     (runs, samples) [rad]; zero throughout where the record shows no servo with a held command.
     """
-    elevator = np.ascontiguousarray(elevator)  # one layout, so that the kernel compiles once
-    bend = np.zeros_like(elevator)
-    decay = servo_decay(np.diff(elevator, axis=1), noise_std_rad, declared_decay)
-    _bends(elevator, decay, np.empty(elevator.shape[1] - 1), bend)
+    surface = np.ascontiguousarray(surface)  # one layout, so that the kernel compiles once
+    bend = np.zeros_like(surface)
+    decay = servo_decay(np.diff(surface, axis=1), noise_std_rad, declared_decay)
+    _bends(surface, decay, np.empty(surface.shape[1] - 1), bend)
     return bend

@@ -12,39 +12,28 @@ Source: V. Klein and E. A. Morelli, Aircraft System Identification, AIAA, 2006, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LATERAL, Motion
+from airtruth.physics.linear_model import BodyConstants, Linear, Structure, bare, places
+from airtruth.physics.motion import LATERAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
 
-class LateralConstants(Protocol):
+class LateralConstants(BodyConstants, Protocol):
     """Constants of the aircraft that the lateral-directional motion needs."""
-
-    @property
-    def wing_area_m2(self) -> float:
-        """Reference area S [m2]."""
 
     @property
     def span_m(self) -> float:
         """Span b [m]."""
 
     @property
-    def mass_kg(self) -> float:
-        """Mass m [kg]."""
-
-    @property
     def inertia_xx_kg_m2(self) -> float:
         """Roll inertia Ixx [kg m2]."""
-
-    @property
-    def inertia_yy_kg_m2(self) -> float:
-        """Pitch inertia Iyy [kg m2]."""
 
     @property
     def inertia_zz_kg_m2(self) -> float:
@@ -77,15 +66,6 @@ class LateralScale:
     half_span_time: Array
     alpha_rad: Array
     theta_rad: Array
-
-
-class Linear(NamedTuple):
-    """x' = a x + b u, y = c x + d u: states, controls and outputs in the order of the motion, (..., rows, columns)."""
-
-    a: Array
-    b: Array
-    c: Array
-    d: Array
 
 
 def lateral_scale(
@@ -133,57 +113,18 @@ def lateral_scale(
     )
 
 
-class Structure(NamedTuple):
-    """The linear model without its derivatives: a = kinematics + forces Theta signals, c likewise.
-
-    Attributes
-    ----------
-    kinematics : (..., states, states) the part of a that needs no aerodynamics.
-    forces : (..., states, coefficients) rates of the states per coefficient.
-    seen : (outputs, states) the part of c that needs no aerodynamics.
-    accelerations : (..., outputs, coefficients) outputs per coefficient.
-    rates : (..., signals) factor of each signal: 1, or b/(2V) [s].
-    """
-
-    kinematics: Array
-    forces: Array
-    seen: Array
-    accelerations: Array
-    rates: Array
-
-
 def structure(s: LateralScale) -> Structure:
     """The parts of the linear model that the flight condition alone decides."""
-    shape = np.shape(s.airspeed_m_s)
-    kinematics, forces = np.zeros((*shape, 4, 4)), np.zeros((*shape, 4, 3))
+    own = bare(LATERAL, s.half_span_time)
+    kinematics, forces = own.kinematics, own.forces
     kinematics[..., 0, 1], kinematics[..., 0, 2] = np.sin(s.alpha_rad), -np.cos(s.alpha_rad)
     kinematics[..., 0, 3] = G0 / s.airspeed_m_s * np.cos(s.theta_rad)
     kinematics[..., 3, 1], kinematics[..., 3, 2] = 1.0, np.tan(s.theta_rad)
     forces[..., 0, 0] = s.force / s.airspeed_m_s
     forces[..., 1, 1], forces[..., 1, 2] = s.roll, s.cross
     forces[..., 2, 1], forces[..., 2, 2] = s.cross, s.yaw
-    accelerations = np.zeros((*shape, len(LATERAL.outputs), 3))
-    accelerations[..., 4, 0] = s.force
-    seen = np.eye(len(LATERAL.outputs), len(LATERAL.states))
-    one = np.ones(shape)
-    rates = np.stack([one if x.length is None else s.half_span_time for x in LATERAL.signals], axis=-1)
-    return Structure(kinematics, forces, seen, accelerations, rates)
-
-
-def places(motion: Motion) -> tuple[tuple[bool, int], ...]:
-    """For each signal of a motion whether it is a state, and its number among the states or controls.
-
-    Examples
-    --------
-    >>> places(LATERAL)
-    ((True, 0), (True, 1), (True, 2), (False, 0), (False, 1))
-    """
-    states = [state.channel for state in motion.states]
-    controls = [control.channel for control in motion.controls]
-    return tuple(
-        (True, states.index(s.channel)) if s.channel in states else (False, controls.index(s.channel))
-        for s in motion.signals
-    )
+    own.accelerations[..., -1, 0] = s.force
+    return own
 
 
 def lateral_system(theta: Array, s: LateralScale) -> Linear:
@@ -273,12 +214,9 @@ def lateral_modes(theta: Array, s: LateralScale) -> tuple[Array, Array]:
 __all__ = [
     "LateralConstants",
     "LateralScale",
-    "Linear",
-    "Structure",
     "lateral_modal",
     "lateral_modes",
     "lateral_scale",
     "lateral_system",
-    "places",
     "structure",
 ]

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.linear_model import BodyConstants, Linear, Structure, bare
 from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
@@ -20,24 +21,12 @@ CL_ALPHA, CL_Q, CL_DE, CM_ALPHA, CM_Q, CM_DE = range(len(LONGITUDINAL.parameters
 """Positions in ``LONGITUDINAL.parameters``."""
 
 
-class PitchConstants(Protocol):
+class PitchConstants(BodyConstants, Protocol):
     """Constants of the aircraft that the short period needs."""
-
-    @property
-    def wing_area_m2(self) -> float:
-        """Reference area S [m2]."""
 
     @property
     def chord_m(self) -> float:
         """Mean aerodynamic chord c [m]."""
-
-    @property
-    def mass_kg(self) -> float:
-        """Mass m [kg]."""
-
-    @property
-    def inertia_yy_kg_m2(self) -> float:
-        """Pitch inertia Iyy [kg m2]."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +117,28 @@ def normal_force_row(theta: Array, s: Scale) -> Array:
     return np.stack([-n * th[..., 0], -n * s.half_chord_time * th[..., 1], -n * th[..., 2]], axis=-1)
 
 
+def linear_system(theta: Array, s: Scale) -> Linear:
+    """The linear model of derivatives: `system` and `normal_force_row`.
+
+    Parameters
+    ----------
+    theta : (..., 6) derivatives [-]; s : factors of shape (...).
+    """
+    (a, b), row, seen = system(theta, s), normal_force_row(theta, s)[..., None, :], np.eye(2)
+    c = np.concatenate([np.zeros_like(a) + seen, row[..., :-1]], axis=-2)
+    d = np.concatenate([np.zeros_like(b[..., None]), row[..., -1:]], axis=-2)
+    return Linear(a, b[..., None], c, d)
+
+
+def structure(s: Scale) -> Structure:
+    """The parts of the linear model that the flight condition alone decides."""
+    own = bare(LONGITUDINAL, s.half_chord_time)
+    own.kinematics[..., 0, 1] = 1.0
+    own.forces[..., 0, 0], own.forces[..., 1, 1] = -s.lift, s.moment
+    own.accelerations[..., -1, 0] = -s.normal
+    return own
+
+
 def modal(theta: Array, s: Scale) -> tuple[Array, Array]:
     """Natural frequency [rad/s] and damping ratio [-] of the two-state model.
 
@@ -167,9 +178,11 @@ __all__ = [
     "PitchConstants",
     "Scale",
     "derivatives",
+    "linear_system",
     "modal",
     "normal_force_row",
     "scale",
     "scale_of",
+    "structure",
     "system",
 ]

@@ -13,7 +13,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.motion_parts import Control
 from airtruth.physics.sensor_errors import Kind
 
@@ -58,17 +58,13 @@ def coefficients_of(motion: Motion) -> tuple[str, ...]:
 
 SIGNALS: Final = signals_of(LONGITUDINAL)
 """`signals_of` the pitch plane."""
-DRIVERS: Final = drivers_of(LONGITUDINAL)
-"""`drivers_of` the pitch plane."""
-FACTORS: Final = factors_of(LONGITUDINAL)
-"""`factors_of` the pitch plane."""
 READINGS: Final = LONGITUDINAL.output_channels
 """Outputs of the filter of the pitch plane."""
 OUTPUTS: Final = frozenset(channel for m in MOTIONS.values() for channel in m.output_channels)
 """Channels of a `ReadingTerm`: the outputs of every motion."""
 ELEVATOR: Final = LONGITUDINAL.controls[0].name
 """Control of a `SurfaceTerm` that names none."""
-_ACROSS: Final = {"arm_right": "p_rad_s"}
+_ACROSS: Final = {"arm_right": LATERAL.gyros[0]}
 """Kind of error of a position -> rate of rotation that it needs, where the channel itself does not imply it."""
 SHAPES: Final = ("linear", "quadratic", "above", "below")
 """Functions f of an `AeroTerm` or a `ReadingTerm`, see `shape_of`; their order numbers them for compiled code."""

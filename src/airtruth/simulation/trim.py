@@ -51,6 +51,8 @@ _STALL: Final = 0.9
 """Reduction of the residual by a step above which such a trim does not get on [-] (judgement)."""
 _PATIENCE: Final = 3
 """Number of such steps after which it ends [-] (judgement)."""
+_PITCH: Final = 3
+"""Number of unknowns in the pitch plane, which come first."""
 _NAMES: Final = ("angle of attack", f"{ELEVATOR} command", "throttle", *LATERAL_CONTROLS, "bank")
 """Names of the unknowns."""
 
@@ -109,7 +111,7 @@ class _Problem:
         model = self.executive.model
         self.throttle = throttle if model.throttle.command else 0.0
         self.glides = self.throttle is not None
-        self.count = 6 if condition.six_axes or model.lateral is not None else 3
+        self.count = 6 if condition.six_axes or model.lateral is not None else _PITCH
         if condition.six_axes and len(model.surfaces(LATERAL)) < len(LATERAL_CONTROLS):
             needed = " and ".join(f"jsbsim.{name}" for name in LATERAL_CONTROLS)
             raise TrimError(
@@ -133,14 +135,14 @@ class _Problem:
     def start(self, alpha_deg: float, command_rad: float, throttle: float) -> Array:
         """(unknowns,) of a start."""
         x = np.zeros(self.count)
-        x[:3] = alpha_deg * DEG, command_rad, _GLIDE[-1] if self.glides else throttle
+        x[:_PITCH] = alpha_deg * DEG, command_rad, _GLIDE[-1] if self.glides else throttle
         return x
 
     def controls(self, x: Array) -> Controls:
         """Controls of a vector of unknowns."""
         throttle = float(x[2]) if self.throttle is None else self.throttle
         commands = {ELEVATOR: float(x[1])}
-        lateral = dict(zip(LATERAL_CONTROLS, map(float, x[3:5]), strict=False))
+        lateral = dict(zip(LATERAL_CONTROLS, map(float, x[_PITCH:5]), strict=False))
         motion = dict(zip((LONGITUDINAL.vane, self.free), (float(x[0]), *map(float, x[5:])), strict=False))
         if self.condition.six_axes:
             return Controls(throttle, commands | lateral, motion=motion)
@@ -289,7 +291,9 @@ def _explain(problem: _Problem, x: Array, size: float, tolerance: float) -> str:
     cause = f"; it ended at the limit of {' and '.join(at)}" if at else ""
     lever = f"flight path {x[2] / DEG:.1f} deg" if problem.glides else f"throttle {x[2]:.2f}"
     if condition.six_axes:
-        lever += "".join(f", {n} {v / DEG:.1f} deg" for n, v in zip(problem.names[3:], x[3:], strict=True))
+        lever += "".join(
+            f", {n} {v / DEG:.1f} deg" for n, v in zip(problem.names[_PITCH:], x[_PITCH:], strict=True)
+        )
     return (
         f"{name} cannot be trimmed at EAS {condition.eas_m_s / KT:.1f} kt, {condition.altitude_m / FT:.0f} ft, "
         f"flight path {condition.gamma_rad / DEG:.1f} deg: residual {size:.2e} (allowed {tolerance:.0e} in SI) at "

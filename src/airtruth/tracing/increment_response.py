@@ -63,7 +63,7 @@ def linear_scale(
     values = values_of(constants, motion)
     assert isinstance(values, LateralValues)
     level = np.zeros_like(airspeed)
-    alpha = channels["alpha_rad"].mean(axis=1) if "alpha_rad" in channels else level
+    alpha = channels[LONGITUDINAL.vane].mean(axis=1) if LONGITUDINAL.vane in channels else level
     theta = channels["theta_rad"].mean(axis=1) if "theta_rad" in channels else alpha
     return lateral_scale(values, airspeed, density, alpha, theta)
 
@@ -88,17 +88,12 @@ def response(
     every = np.broadcast_to(derivatives, (runs, derivatives.shape[-1]))
     if isinstance(scale, LateralScale):
         system, own = lateral_system(every, scale), structure(scale)
-        u = np.einsum("rij,jrn->rni", own.forces, coefficients)
-        x = _driven(system.a, u, dt_s)
-        read = np.einsum("rij,rnj->irn", system.c, x)
-        return np.asarray(read + np.einsum("rij,jrn->irn", own.accelerations, coefficients))
-    lift, moment = coefficients
-    a, _ = short_period.system(every, scale)
-    u = np.stack([-scale.lift[:, None] * lift, scale.moment[:, None] * moment], axis=2)
-    x = _driven(a, u, dt_s)
-    row = short_period.normal_force_row(every, scale)[:, :2]
-    az = np.einsum("rj,rnj->rn", row, x) - scale.normal[:, None] * lift
-    return np.stack([x[..., 0], x[..., 1], az])
+    else:
+        system, own = short_period.linear_system(every, scale), short_period.structure(scale)
+    u = np.einsum("rij,jrn->rni", own.forces, coefficients)
+    x = _driven(system.a, u, dt_s)
+    read = np.einsum("rij,rnj->irn", system.c, x)
+    return np.asarray(read + np.einsum("rij,jrn->irn", own.accelerations, coefficients))
 
 
 def _driven(a: Array, u: Array, dt_s: float) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.increment import Increment, Shape
 from airtruth.effects.increment_shape import names_over
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
 from airtruth.tracing.anomalies.flown import flown
 from airtruth.tracing.answer import Z95, CandidateScore
@@ -93,7 +94,7 @@ def least_certain(effects: Sequence[AcceptedEffect]) -> Iterator[str]:
         table = effect.table
         if table is None:
             continue
-        planned = effect.acts_on in ("CL", "Cm")
+        planned = effect.acts_on in {c.name for c in LONGITUDINAL.coefficients}
         computed = " `airtruth plan --from` computes the input." if planned else ""
         widths = [high - low for low, high in zip(table.low, table.high, strict=True)]
         i = int(np.argmax(widths))

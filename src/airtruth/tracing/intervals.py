@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.accepted import ParameterEstimate
 from airtruth.tracing.answer import Z95
 from airtruth.tracing.inference.profile import Profile, location_index
@@ -43,7 +44,7 @@ def at_measured_alpha(
     ----------
     stated : estimates of an effect; shift_rad : angle of attack of the trim [rad].
     """
-    angles = {p.name for p in effect.parameters if p.is_location and p.name.endswith("alpha_rad")}
+    angles = {p.name for p in effect.parameters if p.is_location and p.name.endswith(LONGITUDINAL.vane)}
     return {name: _moved(e, shift_rad) if name in angles else e for name, e in stated.items()}
 
 

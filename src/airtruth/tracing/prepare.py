@@ -252,9 +252,8 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
 
     airspeed = true("airspeed_m_s", s.airspeed_m_s, s.sub)
     declared = aircraft.file.sensors.get("airspeed_m_s", Sensor()).errors()
-    alpha = s.alpha_rad if s.alpha_rad.size else fine(s.y[:, 0], s.sub)
     if declared.alpha_slope_per_rad != 0.0:
-        airspeed = airspeed / declared.slope(alpha)
+        airspeed = airspeed / declared.slope(s.attack_rad)
     known: dict[str, Any] = {}
     if s.motion is not LONGITUDINAL:
         vane, (gyro,) = LONGITUDINAL.vane, LONGITUDINAL.gyros

@@ -187,8 +187,7 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
         )
         if old.alpha_slope_per_rad == new.alpha_slope_per_rad:
             return values
-        every = s.alpha_rad[:: s.sub] if s.alpha_rad.size else s.y[:, 0]
-        alpha = np.interp(grid, np.arange(samples), every)
+        alpha = np.interp(grid, np.arange(samples), s.attack_rad[:: s.sub])
         return values * old.slope(alpha) / new.slope(alpha)
 
     outputs: Mapping[str, Array] = {c: s.y[:, i] for i, c in enumerate(s.motion.output_channels)}

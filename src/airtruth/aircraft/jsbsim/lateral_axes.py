@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from airtruth.aircraft.file import AircraftFile
-from airtruth.aircraft.jsbsim.linear_parts import product, rate, servo, total
+from airtruth.aircraft.jsbsim.linear_parts import axis, product, rate, servo, total
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.motion_parts import Signal
 
@@ -43,29 +43,24 @@ def lateral_axes(values: Mapping[str, float]) -> str:
     ----------
     values : all derivatives of the motion [1/rad, -].
     """
-    gusts = "".join(f'\n    <property value="0">aero/gust/{axis}-rad_sec</property>' for axis in "pr")
-    rates = "".join(f"\n    {rate(f'{axis}hat', axis, 'bi2vel')}" for axis in "pr")
-    return gusts + rates + "".join(_axis(values, c.name, c.length is not None) for c in LATERAL.coefficients)
+    gusts = "".join(f'\n    <property value="0">aero/gust/{x}-rad_sec</property>' for x in "pr")
+    rates = "".join(f"\n    {rate(f'{x}hat', x, 'bi2vel')}" for x in "pr")
+    axes = (
+        axis(
+            _AXES[c.name],
+            c.name,
+            total(*(product(values[c.name + s.symbol], _property(s)) for s in LATERAL.signals)),
+            c.length,
+        )
+        for c in LATERAL.coefficients
+    )
+    return gusts + rates + "".join(axes)
 
 
 def _property(signal: Signal) -> str:
     if signal.length is not None:
         return f"aero/function/{signal.name}"
     return _SURFACES.get(signal.name, f"aero/{signal.name}-rad")
-
-
-def _axis(values: Mapping[str, float], coefficient: str, is_moment: bool) -> str:
-    signals = ((f"{coefficient}{s.symbol}", _property(s)) for s in LATERAL.signals)
-    length = " <property>metrics/bw-ft</property>" if is_moment else ""
-    return f"""
-    <axis name="{_AXES[coefficient]}">
-      <function name="aero/coefficient/{coefficient}">
-        <product>
-          <property>aero/qbar-psf</property> <property>metrics/Sw-sqft</property>{length}
-          {total(*(product(values[name], signal) for name, signal in signals))}
-        </product>
-      </function>
-    </axis>"""
 
 
 __all__ = ["lateral_axes", "lateral_channels"]

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Final
 
 from airtruth.aircraft.file import Actuator
+from airtruth.physics.motion_parts import Reference
+
+_LENGTHS: Final[Mapping[Reference, str]] = {"chord": "metrics/cbarw-ft", "span": "metrics/bw-ft"}
+"""Reference length -> its property [ft]."""
 
 
 def number(value: float) -> str:
@@ -20,6 +26,20 @@ def product(value: float, name: str) -> str:
 def total(*terms: str) -> str:
     """A sum of terms."""
     return f"<sum> {' '.join(terms)} </sum>"
+
+
+def axis(name: str, coefficient: str, terms: str, length: Reference | None = None) -> str:
+    """The axis of a coefficient: dynamic pressure, area, reference length and the sum of its terms."""
+    by_length = f" <property>{_LENGTHS[length]}</property>" if length is not None else ""
+    return f"""
+    <axis name="{name}">
+      <function name="aero/coefficient/{coefficient}">
+        <product>
+          <property>aero/qbar-psf</property> <property>metrics/Sw-sqft</property>{by_length}
+          {terms}
+        </product>
+      </function>
+    </axis>"""
 
 
 def from_trim(signal: str, name: str, trim: float) -> str:
@@ -63,4 +83,4 @@ def servo(control: str, actuator: Actuator | None) -> str:
     )
 
 
-__all__ = ["from_trim", "number", "product", "rate", "servo", "total"]
+__all__ = ["axis", "from_trim", "number", "product", "rate", "servo", "total"]

@@ -23,9 +23,9 @@ import numpy as np
 
 from airtruth.aircraft.file import Aircraft
 from airtruth.aircraft.jsbsim.lateral_axes import lateral_axes, lateral_channels
-from airtruth.aircraft.jsbsim.linear_parts import from_trim, number, product, rate, servo, total
+from airtruth.aircraft.jsbsim.linear_parts import axis, from_trim, number, product, rate, servo, total
 from airtruth.aircraft.probe import Constants
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import FT, G0, LB, LBF, SLUG
 
 AXIAL: Final = 0.1
@@ -142,46 +142,29 @@ def _controls(aircraft: Aircraft, is_lateral: bool) -> str:
 
 def _aerodynamics(values: Mapping[str, float], at: TrimPoint, normal: float, lateral: str) -> str:
     """Forces and moment; ``normal`` is the normal-force coefficient of the trim [-], ``lateral`` the lateral forces."""
-    lift, moment = (_linear(values, coefficient) for coefficient in ("CL", "Cm"))
+    force, turn = LONGITUDINAL.coefficients
     sine, cosine = float(np.sin(at.alpha_rad)), float(np.cos(at.alpha_rad))
+    along = total(f"<value>{number(-AXIAL * normal)}</value>", product(sine, "aero/function/d-lift"))
+    down = total(f"<value>{number(-normal)}</value>", product(-cosine, "aero/function/d-lift"))
+    axes = (
+        axis("X", "CX", along),
+        axis("Z", "CZ", down),
+        axis("PITCH", turn.name, _linear(values, turn.name), turn.length),
+    )
     return f"""  <aerodynamics>
     <property value="0">aero/gust/q-rad_sec</property>
     {from_trim("alpha", "aero/alpha-rad", at.alpha_rad)}
     {from_trim("elevator", "fcs/elevator-pos-rad", at.elevator_rad)}
     {rate("qhat", "q", "ci2vel")}
     <function name="aero/function/d-lift">
-      {lift}
-    </function>
-    <axis name="X">
-      <function name="aero/coefficient/CX">
-        <product>
-          <property>aero/qbar-psf</property> <property>metrics/Sw-sqft</property>
-          {total(f"<value>{number(-AXIAL * normal)}</value>", product(sine, "aero/function/d-lift"))}
-        </product>
-      </function>
-    </axis>
-    <axis name="Z">
-      <function name="aero/coefficient/CZ">
-        <product>
-          <property>aero/qbar-psf</property> <property>metrics/Sw-sqft</property>
-          {total(f"<value>{number(-normal)}</value>", product(-cosine, "aero/function/d-lift"))}
-        </product>
-      </function>
-    </axis>
-    <axis name="PITCH">
-      <function name="aero/coefficient/Cm">
-        <product>
-          <property>aero/qbar-psf</property> <property>metrics/Sw-sqft</property> <property>metrics/cbarw-ft</property>
-          {moment}
-        </product>
-      </function>
-    </axis>{lateral}
+      {_linear(values, force.name)}
+    </function>{"".join(axes)}{lateral}
   </aerodynamics>"""
 
 
 def _linear(values: Mapping[str, float], coefficient: str) -> str:
-    """Increment of a coefficient by alpha, q and elevator."""
-    signals = {"alpha": "d-alpha", "q": "qhat", "de": "d-elevator"}
+    """Increment of a coefficient by the signals of the pitch plane."""
+    signals = {s.symbol: s.name if s.length is not None else f"d-{s.name}" for s in LONGITUDINAL.signals}
     return total(
         *(product(values[coefficient + by], f"aero/function/{signal}") for by, signal in signals.items())
     )

@@ -36,6 +36,7 @@ from airtruth.identification.lateral.solve import regress_batch, regress_joint
 from airtruth.identification.likelihood.fit import (
     Records,
     correlation_of,
+    estimates_of,
     joint_maximum,
     maximum_of_each,
     memory_of,
@@ -215,20 +216,10 @@ def _with_model_error(
 def _estimates(
     maxima: Maxima, run_ids: tuple[str, ...], scale: AnyScale, options: Options, *, gusts: bool
 ) -> Estimates:
-    covariance = maxima.covariance[:, :_COUNT, :_COUNT]
-    none = options.covariance == "none"
-    return Estimates(
-        method="filter-error" if gusts else "output-error",
-        run_ids=run_ids,
-        theta=maxima.z[:, :_COUNT],
-        covariance=np.full_like(covariance, np.nan) if none else covariance,
-        covariance_name="none" if none else "fisher",
-        status=maxima.status,
-        iterations=maxima.iterations,
-        scale=scale,
-        confidence=options.confidence,
-        motion=LATERAL,
-    )
+    made = estimates_of(maxima, run_ids, scale, LATERAL, options.confidence, gusts)
+    if options.covariance != "none":
+        return made
+    return replace(made, covariance=np.full_like(made.covariance, np.nan), covariance_name="none")
 
 
 __all__ = ["estimate", "estimate_joint", "levels", "search_of"]

@@ -21,6 +21,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import BANK
 from airtruth.identification.condition import window_samples
 from airtruth.identification.lateral.kernels import left_sides
 from airtruth.identification.options import Options
@@ -29,7 +30,7 @@ from airtruth.numerics.intersample import servo_bend
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.lateral import LateralConstants, LateralScale, lateral_scale
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -40,9 +41,15 @@ REGRESSORS: Final = tuple(signal.channel for signal in LATERAL.signals)
 """Channels of the regressors."""
 CONTROLS: Final = tuple(control.channel for control in LATERAL.controls)
 """Channels of the controls."""
-_BETA: Final = REGRESSORS.index("beta_rad")
+ROLL, YAW = LATERAL.gyros
+"""Channels of the rates."""
+_SIDE: Final = LATERAL.outputs[-1].channel
+"""Channel of the specific force along body y."""
+_ATTACK, _PITCH = LONGITUDINAL.vane, LONGITUDINAL.gyros[0]
+"""Channels of the other axis."""
+_BETA: Final = REGRESSORS.index(LATERAL.vane)
 """Number of the regressor whose square is a term."""
-_RATES: Final = slice(REGRESSORS.index("p_rad_s"), REGRESSORS.index("r_rad_s") + 1)
+_RATES: Final = slice(REGRESSORS.index(ROLL), REGRESSORS.index(YAW) + 1)
 """Regressors that are angular rates."""
 
 
@@ -160,7 +167,7 @@ def change_of_attack(batch: Batch, steady: Array) -> Array:
 
 
 def _attack(batch: Batch) -> Array:
-    return np.asarray(batch.channels.get("alpha_rad", np.zeros_like(batch.t_s)))
+    return np.asarray(batch.channels.get(_ATTACK, np.zeros_like(batch.t_s)))
 
 
 def known_inputs(batch: Batch) -> Known:
@@ -173,18 +180,18 @@ def known_inputs(batch: Batch) -> Known:
     Source: V. Klein and E. A. Morelli, Aircraft System Identification, AIAA, 2006, 3.2.
     """
     c, dt_s = batch.channels, batch.dt_s
-    p, r = c["p_rad_s"], c["r_rad_s"]
+    p, r = c[ROLL], c[YAW]
     zero = np.zeros_like(p)
-    alpha = c.get("alpha_rad", c.get("theta_rad", zero))
-    theta, q = c.get("theta_rad", alpha), c.get("q_rad_s", zero)
-    phi, trend = c.get("phi_rad"), 0
+    alpha = c.get(_ATTACK, c.get("theta_rad", zero))
+    theta, q = c.get("theta_rad", alpha), c.get(_PITCH, zero)
+    phi, trend = c.get(BANK), 0
     if phi is None:
         phi, trend = integrated(p + r * np.tan(theta), dt_s), 1
         phi = integrated(p + (q * np.sin(phi) + r * np.cos(phi)) * np.tan(theta), dt_s)
-    beta = c.get("beta_rad")
+    beta = c.get(LATERAL.vane)
     if beta is None:
         v, trend = c["airspeed_m_s"], trend + 1
-        rate = (c["ay_m_s2"] + G0 * np.cos(theta) * np.sin(phi)) / v + p * np.sin(alpha) - r * np.cos(alpha)
+        rate = (c[_SIDE] + G0 * np.cos(theta) * np.sin(phi)) / v + p * np.sin(alpha) - r * np.cos(alpha)
         beta = integrated(rate, dt_s)
     else:
         trend = 0
@@ -194,19 +201,19 @@ def known_inputs(batch: Batch) -> Known:
 def assumed(channels: Collection[str]) -> list[str]:
     """Sentences on the channels that a lateral identification replaces by the steady flight or reconstructs."""
     notes = []
-    if not {"alpha_rad", "theta_rad"} & set(channels):
+    if not {_ATTACK, "theta_rad"} & set(channels):
         notes.append(
-            "lateral motion: without alpha_rad and theta_rad the flight path and the body are taken as level"
+            f"lateral motion: without {_ATTACK} and theta_rad the flight path and the body are taken as level"
         )
-    elif "alpha_rad" not in channels:
-        notes.append("lateral motion: without alpha_rad the path is taken as level, alpha as theta")
+    elif _ATTACK not in channels:
+        notes.append(f"lateral motion: without {_ATTACK} the path is taken as level, alpha as theta")
     elif "theta_rad" not in channels:
         notes.append("lateral motion: without theta_rad the path is taken as level, theta as alpha")
-    if "q_rad_s" not in channels:
-        notes.append("lateral motion: without q_rad_s the products of the rates are left out")
-    if "phi_rad" not in channels and "beta_rad" not in channels:
+    if _PITCH not in channels:
+        notes.append(f"lateral motion: without {_PITCH} the products of the rates are left out")
+    if BANK not in channels and LATERAL.vane not in channels:
         notes.append("lateral motion: phi is integrated from p and r, from level wings")
-    if "beta_rad" not in channels:
+    if LATERAL.vane not in channels:
         notes.append(
             "lateral motion: beta is reconstructed from ay, p, r and phi, and a trend in time is free in each equation; gusts "
             "are no part of it, so that the derivatives of beta err in turbulence"
@@ -226,8 +233,8 @@ def condition_of(batch: Batch, constants: LateralConstants, options: Options, kn
     c = batch.channels
     signals = (c["airspeed_m_s"], air_density(c), known.alpha, known.theta)
     if options.condition == "motion":
-        weight = np.zeros_like(c["p_rad_s"])
-        for name in ("p_rad_s", "r_rad_s"):
+        weight = np.zeros_like(c[ROLL])
+        for name in LATERAL.gyros:
             weight += (c[name] - c[name].mean(axis=1, keepdims=True)) ** 2
         weight /= np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(float).tiny)
         airspeed, density, alpha, theta = (np.einsum("rn,rn->r", x, weight) for x in signals)
@@ -250,7 +257,7 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Late
     c, dt_s = batch.channels, batch.dt_s
     known = known_inputs(batch)
     scale = condition_of(batch, constants, options, known)
-    shape = c["p_rad_s"].shape
+    shape = c[ROLL].shape
     force = np.broadcast_to(scale.force[:, None] * constants.mass_kg, shape)  # q_bar S
     half = np.broadcast_to(scale.half_span_time[:, None], shape)
     if options.pressure != "constant" and options.airspeed_m_s is None:
@@ -264,7 +271,7 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Late
     left_sides(
         np.ascontiguousarray(force),
         np.ascontiguousarray(half),
-        np.stack([c["p_rad_s"], known.q, c["r_rad_s"], c["ay_m_s2"]]),
+        np.stack([c[ROLL], known.q, c[YAW], c[_SIDE]]),
         (
             dt_s,
             constants.mass_kg,

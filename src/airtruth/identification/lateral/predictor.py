@@ -31,13 +31,24 @@ from airtruth.identification.lateral.observation import (
 )
 from airtruth.identification.likelihood.fit import Records
 from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
-from airtruth.identification.likelihood.predictor import W_SHARES, W_START, Predictor, Term, layout
+from airtruth.identification.likelihood.predictor import (
+    W_SHARES,
+    W_START,
+    Predictor,
+    Term,
+    actions,
+    extended,
+    floor_terms,
+    gust_terms,
+    layout,
+    linear_terms,
+)
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import servo_bend, smooth_bend
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
-from airtruth.physics.lateral import LateralConstants, LateralScale, places, structure
+from airtruth.physics.lateral import LateralConstants, LateralScale, structure
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.motion_parts import Derivative
 from airtruth.units import G0
@@ -56,8 +67,6 @@ SURPLUS: Final = tuple(f"surplus_{signal.name}" for signal in LATERAL.signals)
 """Known inputs: each signal times the surplus of the dynamic pressure."""
 TERM: Final = "term_{}_{}"
 """Known input: a nonlinear term by its name and the name of its signal."""
-_FLOOR: Final = 1e-5
-"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 
 
 def levels(outputs: tuple[str, ...], *, gusts: bool) -> tuple[str, ...]:
@@ -95,42 +104,24 @@ def predictor_of(
     measured : with the inputs `SURPLUS`.
     terms : nonlinear terms, of `airtruth.identification.options.TERMS`.
     """
-    own, state_names = structure(scale), [state.name for state in LATERAL.states]
-    controls = [control.name for control in LATERAL.controls]
-    made = []
-    for i, row in enumerate(state_names):
-        for j, column in enumerate(state_names):
-            if own.kinematics[..., i, j].any():
-                made.append(Term("A", row, column, own.kinematics[..., i, j]))
-        made.append(Term("B", row, KINEMATIC[i], 1.0))
-    made += [Term("C", name, name, 1.0) for name in state_names if name in outputs]
-    for derivative in LATERAL.derivatives:
-        is_state, number = places(LATERAL)[derivative.column]
-        signal = (state_names if is_state else controls)[number]
-        rate = own.rates[..., derivative.column]
-        known = _known_inputs(derivative, terms, measured=measured)
-        for kinds, rows, factors in (("AB", state_names, own.forces), ("CD", OUTPUTS, own.accelerations)):
-            for i, row in enumerate(rows):
-                factor = factors[..., i, derivative.row] * rate
-                if not factor.any() or (kinds == "CD" and row not in outputs):
-                    continue
-                made.append(Term(kinds[0 if is_state else 1], row, signal, factor, (derivative.name,)))
-                made += [Term(kinds[1], row, name, factor, (parameter,)) for name, parameter in known]
-                if gusts and signal == LATERAL.implicit[1]:
-                    made += [
-                        Term(
-                            kinds[0], row, state, factor * share / scale.airspeed_m_s, (derivative.name, GUST)
-                        )
-                        for state, share in W_SHARES.items()
-                    ]
+    own, state_names = structure(scale), tuple(state.name for state in LATERAL.states)
+    acting = list(actions(LATERAL, own, outputs))
+    made = linear_terms(LATERAL, own, outputs, acting)
+    made += [Term("B", row, name, 1.0) for row, name in zip(state_names, KINEMATIC, strict=True)]
+    made += [
+        Term(matrices[1], row, name, factor, (parameter,))
+        for matrices, row, derivative, factor in acting
+        for name, parameter in _known_inputs(derivative, terms, measured=measured)
+    ]
     names = levels(outputs, gusts=gusts)
     made += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
     if gusts:
-        made += _air_terms(scale, outputs, length_m)
+        made += gust_terms(LATERAL, acting, outputs, scale.airspeed_m_s, length_m, GUST)
+        made += [Term("Q", name.split("_")[1], "", 1.0, (name,) * 2) for name in PROCESS]
     return Predictor(
         states=(*state_names, *(W_SHARES if gusts else ())),
         inputs=(
-            *controls,
+            *(control.name for control in LATERAL.controls),
             *KINEMATIC,
             *(SURPLUS if measured else ()),
             *(TERM.format(name, LATERAL.signals[j].name) for name, j in nonlinear_columns(terms)),
@@ -154,25 +145,10 @@ def _known_inputs(derivative: Derivative, terms: Collection[str], *, measured: b
     ]
 
 
-def _air_terms(scale: LateralScale, outputs: tuple[str, ...], length_m: float) -> list[Term]:
-    """The gust's own motion, its effect on the vane, and the noise of the moments."""
-    a = scale.airspeed_m_s / length_m
-    first, second = W_SHARES
-    made = [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
-    made.append(Term("Q", first, "", 2.0 * a))
-    made += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
-    if LATERAL.implicit[1] in outputs:
-        made += [
-            Term("C", LATERAL.implicit[1], state, share / scale.airspeed_m_s, (GUST,))
-            for state, share in W_SHARES.items()
-        ]
-    return made
-
-
 def kinematic_inputs(batch: Batch, constants: LateralConstants, scale: LateralScale, known: Known) -> Array:
     """Rates of the states that the linear model leaves out, (runs, samples, states): `KINEMATIC`."""
     c = constants
-    p, r, q, phi = batch.channels["p_rad_s"], batch.channels["r_rad_s"], known.q, known.phi
+    (p, r), q, phi = (batch.channels[name] for name in LATERAL.gyros), known.q, known.phi
     v, alpha0, theta0 = (x[:, None] for x in (scale.airspeed_m_s, scale.alpha_rad, scale.theta_rad))
     beta = p * (np.sin(known.alpha) - np.sin(alpha0)) - r * (np.cos(known.alpha) - np.cos(alpha0))
     beta = beta + G0 / v * (np.cos(known.theta) * np.sin(phi) - np.cos(theta0) * phi)
@@ -187,7 +163,7 @@ def kinematic_inputs(batch: Batch, constants: LateralConstants, scale: LateralSc
 
 def _signals(batch: Batch, known: Known) -> Array:
     """Channels of the signals, (runs, signals, samples); the sideslip measured or reconstructed."""
-    columns = {**batch.channels, "beta_rad": known.beta}
+    columns = {**batch.channels, LATERAL.vane: known.beta}
     return np.stack([columns[name] for name in REGRESSORS], axis=1)
 
 
@@ -262,20 +238,17 @@ def records_by_terms(
     if measured:
         u.append(surplus_inputs(batch, scale, known, options))
     corners = [servo_bend(batch.channels[name]) for name in CONTROLS]
-    floor = _FLOOR * y.std(axis=1)
-    least = tuple(Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs))
+    least = floor_terms(outputs, y)
     y = y - y[:, :1]
     made = []
     for terms in choices:
         inputs = np.concatenate([*u, term_inputs(batch, known, terms, at)], axis=2)
-        edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
-        bend = np.zeros_like(inputs)
-        bend[:, 1:] = (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
+        bend = smooth_bend(inputs, 1)
         for number, corner in enumerate(corners):
             bend[:, :, number] += corner
         own = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured, terms=terms)
-        own = Predictor(**{**vars(own), "terms": (*own.terms, *least)})
-        made.append(Records(batch.dt_s, KalmanSignals(y, inputs, bend), layout(own, y.shape[0]), scale))
+        signals = KalmanSignals(y, inputs, np.ascontiguousarray(bend))
+        made.append(Records(batch.dt_s, signals, layout(extended(own, least), y.shape[0]), scale))
     return made
 
 

@@ -30,8 +30,10 @@ from airtruth.identification.lateral.observation import CONTROLS, LateralObserva
 from airtruth.identification.lateral.responses import LANES, Driven, filter_rows, respond, response_sums
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
+from airtruth.numerics.intersample import smooth_bend
 from airtruth.numerics.prefilter import butterworth, zero_phase
-from airtruth.physics.lateral import places, structure
+from airtruth.physics.lateral import structure
+from airtruth.physics.linear_model import places
 from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
@@ -240,14 +242,6 @@ def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> L
     return LateralProblem(at, moments, model.bounded, runs)
 
 
-def smooth_bend(u: Array) -> Array:
-    """Mean of the cubic through the four nearest samples over the cell that ends at each sample, less that of its ends."""
-    edge = np.concatenate([u[..., :1], u, u[..., -1:]], axis=-1)
-    bend = np.zeros_like(u)
-    bend[..., 1:] = (edge[..., 1:-2] + edge[..., 2:-1] - edge[..., :-3] - edge[..., 3:]) / 24.0
-    return bend
-
-
 @dataclass(frozen=True)
 class LinearModels:
     """The linear models of runs, each at its own flight condition.
@@ -313,6 +307,5 @@ __all__ = [
     "ls_problem",
     "moments_of",
     "rate_of",
-    "smooth_bend",
     "smoothed",
 ]

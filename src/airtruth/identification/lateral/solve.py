@@ -23,9 +23,9 @@ from airtruth.identification.lateral.problems import (
 )
 from airtruth.identification.options import Options
 from airtruth.identification.regression.iterate import IterationOutcome, repeat
-from airtruth.identification.regression.solve import chunks
+from airtruth.identification.regression.solve import assembled, chunks
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.lateral import LateralConstants, LateralScale
+from airtruth.physics.lateral import LateralConstants
 from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
@@ -121,7 +121,8 @@ def regress_batch(
         outcomes.append(outcome)
         scales.append(o.scale)
         covariances.append(_covariance(problem, outcome, options))
-    return _estimates(name, batch.run_ids, outcomes, np.concatenate(covariances), joined(scales), options)
+    scale = joined(scales)
+    return assembled(name, batch.run_ids, outcomes, covariances, scale, options.covariance, options, LATERAL)
 
 
 def _covariance(problem: LateralProblem, outcome: IterationOutcome, options: Options) -> Array:
@@ -170,7 +171,7 @@ def regress_joint(
     if options.covariance != "none" and np.isfinite(outcome.theta).all():
         covariance = _joint_covariance(several, np.repeat(outcome.theta, runs, axis=0), options)
     scale = mean_scale([o.scale for o in observations])
-    return _estimates(name, (JOINT,), [outcome], covariance, scale, options)
+    return assembled(name, (JOINT,), [outcome], [covariance], scale, options.covariance, options, LATERAL)
 
 
 def _joint_covariance(several: _Several, theta: Array, options: Options) -> Array:
@@ -187,28 +188,6 @@ def _joint_covariance(several: _Several, theta: Array, options: Options) -> Arra
         rows = problem.rows(own, runs)
         middle += meat(rows, own, options.covariance, bread, samples).sum(axis=0)
     return sandwich(bread, middle, options.covariance, information)
-
-
-def _estimates(
-    name: str,
-    run_ids: tuple[str, ...],
-    outcomes: Sequence[IterationOutcome],
-    covariance: Array,
-    scale: LateralScale,
-    options: Options,
-) -> Estimates:
-    return Estimates(
-        method=name,
-        run_ids=run_ids,
-        theta=np.concatenate([o.theta for o in outcomes]),
-        covariance=covariance,
-        covariance_name=options.covariance,
-        status=np.concatenate([o.status for o in outcomes]),
-        iterations=np.concatenate([o.iterations for o in outcomes]),
-        scale=scale,
-        confidence=options.confidence,
-        motion=LATERAL,
-    )
 
 
 POSES: Final[dict[str, Pose | None]] = {"ls": None, "iv-lowpass": lowpass_problem, "iv-f1": f1_problem}

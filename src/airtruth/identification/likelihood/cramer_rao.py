@@ -240,7 +240,7 @@ def experiment_bound(
     free = free_parameters(options)
     n = data.layout.sizes[0]
     runs = data.signals.u.shape[0]
-    result = np.empty((runs, 6, 6))
+    result = np.empty((runs, theta.size, theta.size))
     for run in range(runs):
         begin, unknown = np.zeros((n, n)), np.arange(2)
         if start == "stationary":
@@ -248,5 +248,5 @@ def experiment_bound(
             begin = solve_discrete_lyapunov(value.phi[0], value.noise[0])
             unknown = np.arange(0)
         whole = bound(data.layout, run, z, free, data.signals, data.dt_s, begin, unknown)
-        result[run] = whole[:6, :6]
+        result[run] = whole[: theta.size, : theta.size]
     return result

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants, OneOrEach, each_batch, observe
-from airtruth.identification.estimates import JOINT, Estimates, S, mean_scale
+from airtruth.identification.estimates import JOINT, AnyScale, Estimates, S, mean_scale
 from airtruth.identification.likelihood.kalman import score
 from airtruth.identification.likelihood.kalman_kernel import KalmanSignals
 from airtruth.identification.likelihood.options import (
@@ -28,13 +28,20 @@ from airtruth.identification.likelihood.options import (
     free_parameters,
     prior_weights,
 )
-from airtruth.identification.likelihood.predictor import LevelLayout, Term, extended, layout, short_period
+from airtruth.identification.likelihood.predictor import (
+    LevelLayout,
+    Term,
+    extended,
+    floor_terms,
+    layout,
+    short_period,
+)
 from airtruth.identification.likelihood.pressure import products, with_pressure, with_trim_moment
 from airtruth.identification.likelihood.scoring import Maxima, Scored, Search, maximise
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
-from airtruth.numerics.intersample import decay_of, servo_bend
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.numerics.intersample import decay_of, servo_bend, smooth_bend
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.short_period import Scale
 
 Array = NDArray[np.float64]
@@ -42,8 +49,6 @@ Ints = NDArray[np.int64]
 
 MOMENT_NOISE: Final = "noise_moment"
 """Name of the parameter: intensity of the noise in q_dot [rad/s per root second]."""
-_FLOOR: Final = 1e-5
-"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 
 
 @dataclass(frozen=True)
@@ -67,15 +72,15 @@ class Records(Generic[S]):
 def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) -> Records[Scale]:
     """Signals and predictor of a batch; nothing is checked.
 
-    The elevator between samples has the area of the cubic through the four nearest samples, and the
+    The surface between samples has the area of the cubic through the four nearest samples, and the
     corners of a first-order servo behind a held command where the record shows one
     (`airtruth.numerics.intersample`).
     """
     condition = Options(condition=options.condition, airspeed_m_s=options.airspeed_m_s)
     scale = observe(batch, constants, condition).scale
     y = np.stack([batch.channels[CHANNELS[name]] for name in options.outputs], axis=2)
-    elevator = batch.channels["elevator_rad"]
-    u = elevator - elevator[:, :1]
+    surface = batch.channels[LONGITUDINAL.surfaces[0]]
+    u = surface - surface[:, :1]
     bend = servo_bend(u, declared_decay=decay_of(batch.servo_s, batch.dt_s))
     predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
     u, bend = u[:, :, None], bend[:, :, None]
@@ -89,14 +94,12 @@ def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) 
         predictor = extended(predictor, [Term("Q", "q", "", 1.0, noise * 2)], (), (), noise, noise)
     if options.trim_moment_prior is not None:
         predictor = with_trim_moment(predictor, scale)
-    floor = _FLOOR * y.std(axis=1)
-    least = [Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(options.outputs)]
-    edge = np.concatenate([u[:, :1], u, u[:, -1:]], axis=1)
-    bend[:, 1:] += (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
     return Records(
         dt_s=batch.dt_s,
-        signals=KalmanSignals(y - y[:, :1], np.ascontiguousarray(u), np.ascontiguousarray(bend)),
-        layout=layout(extended(predictor, least), y.shape[0]),
+        signals=KalmanSignals(
+            y - y[:, :1], np.ascontiguousarray(u), np.ascontiguousarray(bend + smooth_bend(u, 1))
+        ),
+        layout=layout(extended(predictor, floor_terms(options.outputs, y)), y.shape[0]),
         scale=scale,
     )
 
@@ -231,16 +234,24 @@ def scored(data: Records[S], z: Array, active: Ints, free: Ints, *, informed: bo
 
 
 def _estimates(maxima: Maxima, run_ids: tuple[str, ...], scale: Scale, options: FilterOptions) -> Estimates:
-    six = len(LONGITUDINAL.parameters)
     gusts = options.sigma_u_m_s > 0.0 or options.sigma_w_m_s > 0.0
+    return estimates_of(maxima, run_ids, scale, LONGITUDINAL, options.confidence, gusts)
+
+
+def estimates_of(
+    maxima: Maxima, run_ids: tuple[str, ...], scale: AnyScale, motion: Motion, confidence: float, gusts: bool
+) -> Estimates:
+    """Estimates of the derivatives of a motion, the first parameters; without gusts they are those of output error."""
+    count = len(motion.parameters)
     return Estimates(
         method="filter-error" if gusts else "output-error",
         run_ids=run_ids,
-        theta=maxima.z[:, :six],
-        covariance=maxima.covariance[:, :six, :six],
+        theta=maxima.z[:, :count],
+        covariance=maxima.covariance[:, :count, :count],
         covariance_name="fisher",
         status=maxima.status,
         iterations=maxima.iterations,
         scale=scale,
-        confidence=options.confidence,
+        confidence=confidence,
+        motion=motion,
     )

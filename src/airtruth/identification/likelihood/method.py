@@ -18,12 +18,13 @@ from airtruth.aircraft import Aircraft
 from airtruth.identification.condition import AircraftConstants, Observation, OneOrEach, each_batch
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.likelihood.fit import fit, fit_joint
-from airtruth.identification.likelihood.options import CHANNELS, FilterOptions
+from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.identification.options import Options
 from airtruth.identification.regression.dynamic import dynamic_problem, f1_numerator
 from airtruth.identification.regression.rows import Problem
 from airtruth.identification.regression.solve import chunks, regress_batch, regress_joint
 from airtruth.logs.flight_log import Batch
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.units import FT
 
 Array = NDArray[np.float64]
@@ -48,10 +49,8 @@ MOMENT_NOISE: Final = 0.005
 TRIM_MOMENT_PRIOR: Final = 0.03
 """Prior standard deviation of the trim's moment coefficient [-]; judgement: a thrust of a tenth of the lift, CL of 1,
 an arm of a third of the chord."""
-OUTPUTS: Final = ("alpha", "q", "az")
-"""Outputs of the predictor."""
-READ: Final = tuple(CHANNELS[name] for name in OUTPUTS)
-"""Their channels."""
+READ: Final = LONGITUDINAL.output_channels
+"""Channels of the outputs of the predictor."""
 _FLOOR: Final = 1e-4
 """Least noise of a sensor over the spread of its signal [-]; judgement."""
 _GAUSSIAN: Final = 1.4826

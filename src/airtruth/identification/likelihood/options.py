@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.identification.likelihood.predictor import LEVELS
+from airtruth.identification.likelihood.predictor import AIRSPEED, LEVELS, OUTPUTS
 from airtruth.identification.options import Options
 from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-CHANNELS: Final = {
-    "alpha": "alpha_rad",
-    "q": "q_rad_s",
-    "az": "az_m_s2",
-    "airspeed": "airspeed_m_s",
+CHANNELS: Final = {output.name: output.channel for output in LONGITUDINAL.outputs} | {
+    AIRSPEED: "airspeed_m_s"
 }
 """Output of the predictor -> column of the log."""
 PRESSURES: Final = ("constant", "measured")
@@ -110,7 +107,7 @@ class FilterOptions:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Outputs of the predictor that are compared with the log."""
-        return ("alpha", "q", "az") if self.airspeed_std_m_s is None else tuple(CHANNELS)
+        return OUTPUTS[:-1] if self.airspeed_std_m_s is None else OUTPUTS
 
     @property
     def levels(self) -> Array:

@@ -11,16 +11,18 @@ aircraft; MIL-F-8785C, 3.7.1.2 (Dryden form, no rotary gust) for the air.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import Scale
+from airtruth.physics.linear_model import Structure, places
+from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion_parts import Derivative
+from airtruth.physics.short_period import Scale, structure
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -30,7 +32,9 @@ MATRICES: Final = ("A", "B", "C", "D", "Q", "R")
 """Names of the matrices."""
 LEVELS: Final = ("sigma_u", "sigma_w")
 """Names of the gusts' standard deviations [m/s]."""
-OUTPUTS: Final = ("alpha", "q", "az", "airspeed")
+AIRSPEED: Final = "airspeed"
+"""Name of the airspeed among the outputs."""
+OUTPUTS: Final = (*(output.name for output in LONGITUDINAL.outputs), AIRSPEED)
 """Names of the outputs."""
 
 _W1: Final = math.sqrt(1.5)
@@ -41,6 +45,8 @@ _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
 
 W_SHARES: Final = {"w1": _W1, "w2": _W2}
 """Shares of the two states of a transverse gust in it, over its standard deviation [-]."""
+_FLOOR: Final = 1e-5
+"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 W_START: Final = ((1.0, 0.5), (0.5, 0.5))
 """Covariance of these states in a stationary gust [-]."""
 
@@ -110,8 +116,85 @@ class LevelLayout:
     sizes: tuple[int, int, int, int]
 
 
+class Action(NamedTuple):
+    """A derivative that acts on the rate of a state or on an output.
+
+    Attributes
+    ----------
+    matrices : where a state, and where an input acts on that row: "AB" or "CD".
+    row : state or output; derivative : of a motion.
+    factor : (runs,) per derivative and per signal [units of the row over those of the signal].
+    """
+
+    matrices: str
+    row: str
+    derivative: Derivative
+    factor: Array
+
+
+def actions(motion: Motion, own: Structure, outputs: Sequence[str]) -> Iterator[Action]:
+    """Where each derivative of a motion acts: on rates of states, then on those of some outputs."""
+    states = tuple(state.name for state in motion.states)
+    every = tuple(output.name for output in motion.outputs)
+    for derivative in motion.derivatives:
+        rate = own.rates[..., derivative.column]
+        for matrices, rows, factors in (("AB", states, own.forces), ("CD", every, own.accelerations)):
+            for i, row in enumerate(rows):
+                factor = factors[..., i, derivative.row] * rate
+                if factor.any() and (matrices == "AB" or row in outputs):
+                    yield Action(matrices, row, derivative, factor)
+
+
+def linear_terms(
+    motion: Motion, own: Structure, outputs: Sequence[str], acting: Iterable[Action]
+) -> list[Term]:
+    """Terms of a motion in still air: kinematics, outputs that are states, and derivatives with their signals."""
+    states, controls = ([x.name for x in each] for each in (motion.states, motion.controls))
+    made = [
+        Term("A", row, column, own.kinematics[..., i, j])
+        for i, row in enumerate(states)
+        for j, column in enumerate(states)
+        if own.kinematics[..., i, j].any()
+    ]
+    made += [Term("C", name, name, 1.0) for name in states if name in outputs]
+    for matrices, row, derivative, factor in acting:
+        is_state, number = places(motion)[derivative.column]
+        matrix, names = (matrices[0], states) if is_state else (matrices[1], controls)
+        made.append(Term(matrix, row, names[number], factor, (derivative.name,)))
+    return made
+
+
+def gust_terms(
+    motion: Motion,
+    acting: Iterable[Action],
+    outputs: Sequence[str],
+    airspeed_m_s: Array,
+    length_m: float,
+    level: str,
+) -> list[Term]:
+    """A transverse gust, the states `W_SHARES`: it acts as the flow angle gust/V does, and the vane reads it.
+
+    Parameters
+    ----------
+    acting : of the derivatives of the motion.
+    airspeed_m_s : (runs,) [m/s]; length_m : scale length of the gust [m]; level : parameter of its standard deviation [m/s].
+    """
+    a, (first, second) = airspeed_m_s / length_m, W_SHARES
+    made = [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
+    made.append(Term("Q", first, "", 2.0 * a))
+    by_flow = [x for x in acting if motion.signals[x.derivative.column].name == motion.flow]
+    for state, share in W_SHARES.items():
+        made += [
+            Term(x.matrices[0], x.row, state, x.factor * share / airspeed_m_s, (x.derivative.name, level))
+            for x in by_flow
+        ]
+        if motion.flow in outputs:
+            made.append(Term("C", motion.flow, state, share / airspeed_m_s, (level,)))
+    return made
+
+
 def short_period(
-    scale: Scale, length_u_m: float, length_w_m: float, outputs: Sequence[str] = OUTPUTS[:3]
+    scale: Scale, length_u_m: float, length_w_m: float, outputs: Sequence[str] = OUTPUTS[:-1]
 ) -> Predictor:
     """The linear short period with Dryden gusts u and w.
 
@@ -140,49 +223,34 @@ def short_period(
     for name in outputs:
         if name not in OUTPUTS:
             raise ConfigurationError(f"output {name!r} of the filter: {choices(name, OUTPUTS)}")
-    v, lift, moment, half = scale.airspeed_m_s, scale.lift, scale.moment, scale.half_chord_time
-    a, normal = v / length_w_m, scale.normal
+    v, own, (along, transverse) = scale.airspeed_m_s, structure(scale), LEVELS
+    acting = list(actions(LONGITUDINAL, own, outputs))
     terms = [
-        Term("A", "alpha", "q", 1.0),
-        Term("A", "alpha", "alpha", -lift, ("CLalpha",)),
-        Term("A", "alpha", "q", -lift * half, ("CLq",)),
-        Term("B", "alpha", "elevator", -lift, ("CLde",)),
-        Term("A", "q", "alpha", moment, ("Cmalpha",)),
-        Term("A", "q", "q", moment * half, ("Cmq",)),
-        Term("B", "q", "elevator", moment, ("Cmde",)),
+        *linear_terms(LONGITUDINAL, own, outputs, acting),
+        *gust_terms(LONGITUDINAL, acting, outputs, v, length_w_m, transverse),
         Term("A", "u", "u", -v / length_u_m),
         Term("Q", "u", "", 2.0 * v / length_u_m),
-        Term("A", "alpha", "u", -2.0 * G0 / v**2, ("sigma_u",)),
-        Term("A", "w1", "w1", -a),
-        Term("A", "w2", "w2", -a),
-        Term("A", "w2", "w1", a),
-        Term("Q", "w1", "", 2.0 * a),
-        Term("C", "alpha", "alpha", 1.0),
-        Term("C", "q", "q", 1.0),
-        Term("C", "az", "alpha", -normal, ("CLalpha",)),
-        Term("C", "az", "q", -normal * half, ("CLq",)),
-        Term("D", "az", "elevator", -normal, ("CLde",)),
-        Term("C", "az", "u", -2.0 * G0 / v, ("sigma_u",)),
-        Term("C", "airspeed", "u", 1.0, ("sigma_u",)),
+        Term("A", LONGITUDINAL.flow, "u", -2.0 * G0 / v**2, (along,)),
+        Term("C", LONGITUDINAL.outputs[-1].name, "u", -2.0 * G0 / v, (along,)),
+        Term("C", AIRSPEED, "u", 1.0, (along,)),
     ]
-    for state, weight in W_SHARES.items():
-        terms += [
-            Term("A", "alpha", state, -lift * weight / v, ("CLalpha", "sigma_w")),
-            Term("A", "q", state, moment * weight / v, ("Cmalpha", "sigma_w")),
-            Term("C", "alpha", state, weight / v, ("sigma_w",)),
-            Term("C", "az", state, -normal * weight / v, ("CLalpha", "sigma_w")),
-        ]
     terms += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
     levels = (*LEVELS, *(f"noise_{name}" for name in outputs))
     return Predictor(
-        states=("alpha", "q", "u", "w1", "w2"),
-        inputs=("elevator",),
+        states=(*(state.name for state in LONGITUDINAL.states), "u", *W_SHARES),
+        inputs=tuple(control.name for control in LONGITUDINAL.controls),
         outputs=tuple(outputs),
         parameters=(*LONGITUDINAL.parameters, *levels),
         logarithmic=levels,
         terms=tuple(t for t in terms if t.matrix not in "CDR" or t.row in outputs),
-        start=((("u",), ((1.0,),)), (("w1", "w2"), W_START)),
+        start=((("u",), ((1.0,),)), (tuple(W_SHARES), W_START)),
     )
+
+
+def floor_terms(outputs: Sequence[str], y: Array) -> list[Term]:
+    """Least variance of the noise of measured outputs (runs, samples, outputs)."""
+    floor = _FLOOR * y.std(axis=1)
+    return [Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs)]
 
 
 def extended(

@@ -20,28 +20,26 @@ from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants, across_path, ratios_of
 from airtruth.identification.lateral_inputs import lateral_inputs
-from airtruth.identification.likelihood.predictor import Predictor, Term, extended
+from airtruth.identification.likelihood.predictor import AIRSPEED, Predictor, Term, actions, extended
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.short_period import Scale
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.short_period import Scale, structure
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
 TRIM_MOMENT: Final = "Cmtrim"
 """Name of the parameter: aerodynamic moment coefficient of the trim [-]."""
-INPUTS: Final = (
-    "lift_alpha",
-    "lift_q",
-    "lift_elevator",
-    "lift_trim",
-    "moment_alpha",
-    "moment_q",
-    "moment_elevator",
-    "normal_trim",
-    "gravity",
-)
-"""Measured alpha, q and elevator times the surplus: in alpha_dot, in q_dot and az; the surplus itself,
-by which the lift of the trimmed aircraft grows; and the change of gravity across the path."""
+TURNING: Final = tuple(f"turning_{signal.name}" for signal in LONGITUDINAL.signals)
+"""Each signal times the surplus with which its lift turns the path."""
+SURPLUS: Final = tuple(f"surplus_{signal.name}" for signal in LONGITUDINAL.signals)
+"""Each signal times the surplus of its forces and moments."""
+TRIM: Final = ("turning_trim", "surplus_trim")
+"""The surplus itself, by which the lift of the trimmed aircraft grows, where it turns the path and where az shows it."""
+GRAVITY: Final = "gravity"
+"""Change of gravity across the path."""
+INPUTS: Final = (*TURNING, TRIM[0], *SURPLUS, TRIM[1], GRAVITY)
+"""Inputs of every record."""
 LATERAL_INPUTS: Final = ("lateral_alpha", "lateral_q")
 """Parts of alpha_dot and q_dot that the lateral motion causes, in records of both motions."""
 
@@ -49,7 +47,7 @@ LATERAL_INPUTS: Final = ("lateral_alpha", "lateral_q")
 def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
     """Inputs `INPUTS`, and `LATERAL_INPUTS` where a run has lateral motion, (runs, samples, inputs).
 
-    alpha, q and the elevator are taken relative to their means over the record, to which the lift at
+    The signals are taken relative to their means over the record, to which the lift at
     p = 1 in `with_pressure` belongs.
 
     Parameters
@@ -58,17 +56,19 @@ def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
     scale : factors (runs,) of the reference condition.
     """
     v, p = ratios_of(batch, constants, scale)
-    alpha, q, elevator = (
-        batch.channels[name] - batch.channels[name].mean(axis=1, keepdims=True)
-        for name in ("alpha_rad", "q_rad_s", "elevator_rad")
-    )
-    path, rate, force = p / v - 1.0, p / v**2 - 1.0, p - 1.0
-    lift = (path * alpha, rate * q, path * elevator, force / v)  # the weight turns the path by 1/v too
-    moment = (force * alpha, path * q, force * elevator, force)
+    path, force = p / v - 1.0, p - 1.0
+    turning, surplus = [], []
+    for signal in LONGITUDINAL.signals:
+        moved = batch.channels[signal.channel] - batch.channels[signal.channel].mean(axis=1, keepdims=True)
+        turning.append((path if signal.length is None else p / v**2 - 1.0) * moved)
+        surplus.append((force if signal.length is None else path) * moved)
     across = across_path(batch)
     gravity = (across - across.mean(axis=1, keepdims=True)) / v
     lateral = lateral_inputs(batch, constants)
-    return np.stack([*lift, *moment, gravity, *(lateral if lateral[1].any() else ())], axis=2)
+    trim = force / v  # the weight turns the path by 1/v too
+    return np.stack(
+        [*turning, trim, *surplus, force, gravity, *(lateral if lateral[1].any() else ())], axis=2
+    )
 
 
 def with_pressure(
@@ -82,28 +82,22 @@ def with_pressure(
         the trim follows the gust u; without, it follows the measured airspeed, and u is the part that this does not show.
     scale, batch, constants : as in `products`; count : number of inputs that it made.
     """
-    lift, moment, half, normal = scale.lift, scale.moment, scale.half_chord_time, scale.normal
-    terms = [Term("B", "alpha", "gravity", G0 / scale.airspeed_m_s)]
-    for source, factor, cl, cm in (
-        ("alpha", 1.0, "CLalpha", "Cmalpha"),
-        ("q", half, "CLq", "Cmq"),
-        ("elevator", 1.0, "CLde", "Cmde"),
-    ):
-        terms += [
-            Term("B", "alpha", f"lift_{source}", -lift * factor, (cl,)),
-            Term("B", "q", f"moment_{source}", moment * factor, (cm,)),
-            Term("D", "az", f"moment_{source}", -normal * factor, (cl,)),
-        ]
-    if "airspeed" not in predictor.outputs:
+    flow, normal = LONGITUDINAL.flow, LONGITUDINAL.outputs[-1]
+    terms = [Term("B", flow, GRAVITY, G0 / scale.airspeed_m_s)]
+    for matrices, row, derivative, factor in actions(LONGITUDINAL, structure(scale), predictor.outputs):
+        source = (TURNING if row == flow else SURPLUS)[derivative.column]
+        terms.append(Term(matrices[1], row, source, factor, (derivative.name,)))
+    if AIRSPEED not in predictor.outputs:
         _, p = ratios_of(batch, constants, scale)
-        az = (batch.channels["az_m_s2"] / p).mean(axis=1)
+        steady = (batch.channels[normal.channel] / p).mean(axis=1)
         terms += [
-            Term("B", "alpha", "lift_trim", az / scale.airspeed_m_s),
-            Term("D", "az", "normal_trim", az),
+            Term("B", flow, TRIM[0], steady / scale.airspeed_m_s),
+            Term("D", normal.name, TRIM[1], steady),
         ]
     names = (*INPUTS, *LATERAL_INPUTS)[:count]
     terms += [
-        Term("B", row, name, 1.0) for row, name in zip(("alpha", "q"), names[len(INPUTS) :], strict=False)
+        Term("B", state.name, name, 1.0)
+        for state, name in zip(LONGITUDINAL.states, names[len(INPUTS) :], strict=False)
     ]
     return extended(predictor, terms, inputs=names)
 
@@ -119,6 +113,6 @@ def with_trim_moment(predictor: Predictor, scale: Scale) -> Predictor:
     """
     by_gust = 2.0 * scale.moment / scale.airspeed_m_s
     terms = [Term("A", "q", "u", by_gust, (TRIM_MOMENT, "sigma_u"))]
-    if "normal_trim" in predictor.inputs and "airspeed" not in predictor.outputs:
-        terms.append(Term("B", "q", "normal_trim", scale.moment, (TRIM_MOMENT,)))
+    if TRIM[1] in predictor.inputs and AIRSPEED not in predictor.outputs:
+        terms.append(Term("B", "q", TRIM[1], scale.moment, (TRIM_MOMENT,)))
     return extended(predictor, terms, parameters=(TRIM_MOMENT,))

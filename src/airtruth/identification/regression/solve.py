@@ -16,7 +16,7 @@ from airtruth.identification.condition import (
     each_batch,
     observe,
 )
-from airtruth.identification.estimates import JOINT, Estimates, Status, joined, mean_scale
+from airtruth.identification.estimates import JOINT, AnyScale, Estimates, Status, joined, mean_scale
 from airtruth.identification.options import Options
 from airtruth.identification.regression.covariance import (
     COVARIANCES,
@@ -28,7 +28,7 @@ from airtruth.identification.regression.iterate import IterationOutcome, iterate
 from airtruth.identification.regression.lowpass import ls_problem
 from airtruth.identification.regression.rows import Equations, Problem, Projected, project
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.short_period import Scale
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -109,17 +109,18 @@ def assembled(
     run_ids: tuple[str, ...],
     outcomes: Sequence[IterationOutcome],
     covariances: Sequence[Array],
-    scale: Scale,
+    scale: AnyScale,
     covariance_name: str,
     options: Options,
+    motion: Motion = LONGITUDINAL,
 ) -> Estimates:
     """Estimates of a method from the outcomes of its chunks.
 
     Parameters
     ----------
     name : of the method; run_ids : of all runs; scale : factors of all runs.
-    outcomes, covariances : of each chunk, (runs, 6, 6) each.
-    covariance_name : name of the covariance; options : of the identification.
+    outcomes, covariances : of each chunk, (runs, derivatives, derivatives) each.
+    covariance_name : name of the covariance; options : of the identification; motion : whose derivatives they are.
     """
     return Estimates(
         method=name,
@@ -131,6 +132,7 @@ def assembled(
         iterations=np.concatenate([o.iterations for o in outcomes]),
         scale=scale,
         confidence=options.confidence,
+        motion=motion,
     )
 
 

@@ -19,12 +19,16 @@ from numpy.typing import NDArray
 from scipy.signal import detrend
 from scipy.special import log_ndtr
 
+from airtruth.channels import SIGNALS
 from airtruth.checks.spectra import integral, regress, spectrum
 from airtruth.physics.atmosphere import density_kg_m3
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion_parts import Control
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
+(_SURFACE,) = LONGITUDINAL.controls
 BLOCK_S: Final = 8.0
 """Length of a block [s] (judgement: some periods of the short period, shorter than drifts)."""
 BAND_HZ: Final = 1.0
@@ -162,8 +166,8 @@ def _level(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
 
 
 def control(c: Mapping[str, Array], dt_s: float) -> tuple[float, float]:
-    """Change of q' with the elevator, with q and alpha held, and its standard deviation [1/s2]."""
-    return effect(c["q"], [c["elevator"], incidence(c, dt_s), c["q"]], dt_s)
+    """Change of q' with the surface, with q and alpha held, and its standard deviation [1/s2]."""
+    return effect(c["q"], [c[_SURFACE.name], incidence(c, dt_s), c["q"]], dt_s)
 
 
 def effect(rate: Array, causes: Sequence[Array], dt_s: float) -> tuple[float, float]:
@@ -177,7 +181,12 @@ def effect(rate: Array, causes: Sequence[Array], dt_s: float) -> tuple[float, fl
 
 
 def _pitches(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
-    return moves(*control(c, dt_s), 15.0, "the elevator changes q'")
+    return moves(*control(c, dt_s), 15.0, changes(_SURFACE))
+
+
+def changes(control: Control) -> str:
+    """What a surface does to the rate that it controls, in words."""
+    return f"the {control.name} changes {SIGNALS[control.damped].stem}'"
 
 
 def moves(value: float, std: float, usual: float, words: str) -> SlotFinding:
@@ -204,9 +213,7 @@ def moves(value: float, std: float, usual: float, words: str) -> SlotFinding:
 def _lifts(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     """Lift follows alpha = theta - gamma, gamma the integral of the load over V: az = -a (theta + integral(az + g)/V)."""
     theta, load = c["theta"] if "theta" in c else integral(c["q"], dt_s), c["az"] + G0
-    causes = (
-        [theta, integral(load, dt_s), c["elevator"]] if "elevator" in c else [theta, integral(load, dt_s)]
-    )
+    causes = [theta, integral(load, dt_s), *(c[name] for name in (_SURFACE.name,) if name in c)]
     with np.errstate(all="ignore"):
         factors = regress(
             spectrum(load[None], dt_s), np.stack([spectrum(x[None], dt_s) for x in causes], axis=1)
@@ -262,10 +269,10 @@ RELATIONS: Final = (
     SlotRelation(("alpha", "theta"), _level),
     SlotRelation(("alpha", "q", "az", "airspeed"), _HEAVED, ("theta", "ax")),
     SlotRelation(("airspeed", "theta", "q", "az", "ax"), _DRAWN, ("alpha",)),
-    SlotRelation(("airspeed", "az", "q"), _lifts, ("theta", "elevator")),
+    SlotRelation(("airspeed", "az", "q"), _lifts, ("theta", _SURFACE.name)),
     SlotRelation(("altitude", "theta", "az"), _LIFTED, ("ax",)),
     SlotRelation(("altitude", "theta", "alpha", "airspeed"), _FLOWN),
-    SlotRelation(("elevator", "q", "az"), _pitches, ("alpha", "airspeed", "theta")),
+    SlotRelation((_SURFACE.name, "q", "az"), _pitches, ("alpha", "airspeed", "theta")),
     SlotRelation(("airspeed", "ground_speed"), _ground),
     SlotRelation(("density", "altitude"), _air),
     SlotRelation(("altitude", "gps_altitude"), _pressure_height),
@@ -277,6 +284,7 @@ __all__ = [
     "RELATIONS",
     "SlotFinding",
     "SlotRelation",
+    "changes",
     "compared",
     "control",
     "effect",

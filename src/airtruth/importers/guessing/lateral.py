@@ -12,16 +12,18 @@ A right aileron that moves down rolls to the left, and a rudder whose trailing e
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import SIGNALS
 from airtruth.checks.spectra import integral
 from airtruth.importers.guessing.evidence import (
     SlotFinding,
     SlotRelation,
+    changes,
     compared,
     effect,
     moved,
@@ -29,9 +31,12 @@ from airtruth.importers.guessing.evidence import (
     near,
 )
 from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion_parts import Control
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
+
+_ROLLING, _YAWING = LATERAL.controls
 
 
 def _yawing(c: Mapping[str, Array]) -> Array:
@@ -74,14 +79,16 @@ def _turned(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
     )
 
 
-def _rolls(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
-    others = [c[name] for name in ("p", "r", "beta") if name in c]
-    return moves(*effect(c["p"], [c["aileron"], *others], dt_s), 30.0, "the aileron changes p'")
+def _turned_by(control: Control, usual: float, beside: Sequence[str]) -> Callable[..., SlotFinding]:
+    """Test of the effect of a surface on its rate, usually of a size [1/s2], with the slots beside it that are filled held."""
+    rate = SIGNALS[control.damped].stem
 
+    def test(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
+        others = [name for name in beside if name != "ay" or "beta" not in c]  # ay stands for an absent beta
+        held = [c[name] for name in (rate, *others) if name in c]
+        return moves(*effect(c[rate], [c[control.name], *held], dt_s), usual, changes(control))
 
-def _yaws(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
-    others = [c[name] for name in ("r", "p", "beta" if "beta" in c else "ay") if name in c]
-    return moves(*effect(c["r"], [c["rudder"], *others], dt_s), 6.0, "the rudder changes r'")
+    return test
 
 
 def _centred(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
@@ -118,8 +125,8 @@ LATERAL_RELATIONS: Final = (
     SlotRelation(("psi", "r"), _HEADED, ("theta", "q", "phi")),
     SlotRelation(("beta", "ay", "phi", "r", "airspeed"), _SLIPPED, ("p", "theta", "alpha")),
     SlotRelation(("r", "phi", "ay", "airspeed"), _turned, ("p", "theta", "alpha", "beta")),
-    SlotRelation(("aileron", "p"), _rolls, ("r", "beta")),
-    SlotRelation(("rudder", "r"), _yaws, ("p", "beta", "ay")),
+    SlotRelation((_ROLLING.name, "p"), _turned_by(_ROLLING, 30.0, ("r", "beta")), ("r", "beta")),
+    SlotRelation((_YAWING.name, "r"), _turned_by(_YAWING, 6.0, ("p", "beta", "ay")), ("p", "beta", "ay")),
     *(_commanded(control.name) for control in LATERAL.controls),
 )
 """Everything that is tested of the lateral-directional motion. A relation uses further slots where they are assigned."""

@@ -46,7 +46,6 @@ class SurveyedControl:
     Attributes
     ----------
     name : of the control.
-    standard : its command in JSBSim's own flight controls.
     command, surface : names of other commands, and of surfaces (judgement).
     acceleration : attribute of `airtruth.simulation.simulator.SimulatorResponse` that it changes; a positive surface lowers it.
     moment, against : the moment, and the sense of motion for which a model may count its surface positive, in words.
@@ -54,7 +53,6 @@ class SurveyedControl:
     """
 
     name: str
-    standard: str
     command: re.Pattern[str]
     surface: re.Pattern[str]
     acceleration: str
@@ -62,13 +60,17 @@ class SurveyedControl:
     against: str
     axis: str = ""
 
+    @property
+    def standard(self) -> str:
+        """Its command in JSBSim's own flight controls."""
+        return f"fcs/{self.name}-cmd-norm"
+
 
 SURVEYED: Final = {
     control.name: control
     for control in (
         SurveyedControl(
             "elevator",
-            "fcs/elevator-cmd-norm",
             re.compile(r"elev.*cmd|cmd.*elev|pitch.*cmd|stick|stabilator.*cmd", re.IGNORECASE),
             re.compile(r"elev|stab|htail|canard|pitch", re.IGNORECASE),
             "q_dot_rad_s2",
@@ -77,7 +79,6 @@ SURVEYED: Final = {
         ),
         SurveyedControl(
             "aileron",
-            "fcs/aileron-cmd-norm",
             re.compile(r"ail.*cmd|cmd.*ail|roll.*cmd|elevon.*cmd|stick", re.IGNORECASE),
             re.compile(r"ail|elevon|flaperon|roll|wing-warp|spoiler|taileron", re.IGNORECASE),
             "p_dot_rad_s2",
@@ -87,7 +88,6 @@ SURVEYED: Final = {
         ),
         SurveyedControl(
             "rudder",
-            "fcs/rudder-cmd-norm",
             re.compile(r"rud.*cmd|cmd.*rud|yaw.*cmd|pedal", re.IGNORECASE),
             re.compile(r"rud|yaw", re.IGNORECASE),
             "r_dot_rad_s2",

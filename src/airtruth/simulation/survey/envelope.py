@@ -199,7 +199,9 @@ def _ranges_deg(aircraft: Aircraft, at: Trim, seconds: float, amplitude_deg: flo
     command[2 * half : 3 * half] = amplitude_deg * DEG
     command[3 * half : 4 * half] = -amplitude_deg * DEG
     channels = Flight(aircraft, at, STEP_S, 4).fly(Inputs(command, still, still))
-    alpha, surface = (float(np.ptp(channels[name])) / DEG for name in ("alpha_rad", "elevator_rad"))
+    alpha, surface = (
+        float(np.ptp(channels[name])) / DEG for name in (LONGITUDINAL.vane, *LONGITUDINAL.surfaces)
+    )
     return alpha, surface
 
 

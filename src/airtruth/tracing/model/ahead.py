@@ -14,15 +14,14 @@ from airtruth.tracing.model.filter import innovations, path_of
 from airtruth.tracing.model.flight_slopes import innovation_slopes
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
-    AirPoint,
+    AirInputs,
     EffectArrays,
     FilterModel,
-    GridSignals,
     GustModel,
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid, LateralPoint
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralInputs
 from airtruth.tracing.model.lateral_slopes import LateralMoves
 from airtruth.tracing.model.linearise import FirstUpdate, linearise
 from airtruth.tracing.model.parameters import ParameterLayout, core_states, state_layout
@@ -36,12 +35,11 @@ _AXIS: Final = np.array([0.0, 1.0])
 
 
 class _Kind(NamedTuple):
-    """Types of a motion's aircraft, of its inputs at a point and along a record, and what its parameters move."""
+    """Types of a motion's aircraft, of its inputs, and what its parameters move."""
 
     motion: Motion
     aircraft: AircraftArrays | LateralAircraft
-    point: type[Any]
-    grid: type[Any]
+    inputs: type[Any]
     moves: AircraftMoves | LateralMoves
 
     @property
@@ -57,7 +55,7 @@ class _Kind(NamedTuple):
     @property
     def at(self) -> Any:
         """Inputs at a point."""
-        return self.point(*[1.0] * len(self.point._fields))
+        return self.inputs(*[1.0] * len(self.inputs._fields))
 
     @property
     def model(self) -> FilterModel:
@@ -74,7 +72,7 @@ class _Kind(NamedTuple):
     @property
     def given(self) -> KernelInput:
         """A record of two samples."""
-        zeros, grid = np.zeros((2, self.outputs)), self.grid(*[np.ones(3)] * len(self.grid._fields))
+        zeros, grid = np.zeros((2, self.outputs)), self.inputs(*[np.ones(3)] * len(self.inputs._fields))
         of_start = ParameterLayout(self.motion).per_record.start
         start = np.zeros(of_start.stop - of_start.start)
         return KernelInput(zeros, zeros, grid, np.empty((0, 0)), 1.0, 2, start, 0.0, self.at, self.model)
@@ -86,7 +84,7 @@ def _pitch() -> _Kind:
     table = np.zeros((2, 2, 2, forces))
     aircraft = AircraftArrays._make([*[1.0] * 12, table[0, 0], increments, _AXIS, _AXIS, _AXIS, table])
     moves = AircraftMoves(1.0, np.zeros(forces), table[0, 0], 0.0, states, states)
-    return _Kind(motion, aircraft, AirPoint, GridSignals, moves)
+    return _Kind(motion, aircraft, AirInputs, moves)
 
 
 def _side() -> _Kind:
@@ -98,7 +96,7 @@ def _side() -> _Kind:
     about = [signals, controls, controls, *[0.0] * 4, table[0, 0], increments]
     aircraft = LateralAircraft._make([*[1.0] * 8, *about, _AXIS, points, table])
     moves = LateralMoves(1.0, increments, 0.0, states, states)
-    return _Kind(motion, aircraft, LateralPoint, LateralGrid, moves)
+    return _Kind(motion, aircraft, LateralInputs, moves)
 
 
 def _linearise(kind: _Kind) -> None:

@@ -33,6 +33,7 @@ from airtruth.tracing.model.by_motion import MotionEquations, register
 from airtruth.tracing.model.gust_states import gust_of, gust_rates
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
+    AirInputs,
     AirPoint,
     EffectArrays,
     FilterModel,
@@ -286,7 +287,7 @@ def settle_effects(x: Array, at: AirPoint, model: FilterModel) -> None:
 @inner
 def air_at(grid: GridSignals, point: int) -> AirPoint:
     """Inputs at a point of the filter's grid."""
-    return AirPoint(
+    return AirInputs(
         grid.elevator_rad[point],
         grid.airspeed_m_s[point],
         grid.ground_m_s[point],
@@ -345,7 +346,7 @@ def signals_at(x: Array, at: AirPoint, rate: float, model: FilterModel, out: Arr
 @inner
 def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
     """See `airtruth.tracing.model.by_motion.shifted`; no effect moves the fields between the control and the coefficients."""
-    return AirPoint(
+    return AirInputs(
         at.elevator_rad + (by if field == 0 else 0.0),
         at.airspeed_m_s,
         at.ground_m_s,
@@ -358,7 +359,7 @@ def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
 
 register(
     AircraftArrays,
-    GridSignals,
+    AirInputs,
     MotionEquations(
         states=len(LONGITUDINAL.states),
         early=len(LONGITUDINAL.outputs) - 1,
@@ -369,7 +370,7 @@ register(
         settle=settle_effects,
         shifted=shifted,
         signals_at=signals_at,
-        point=AirPoint,
+        point=AirInputs,
         coefficients=len(LONGITUDINAL.coefficients),
     ),
 )

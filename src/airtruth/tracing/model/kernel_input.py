@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from airtruth.tracing.model.parameters import StateLayout
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+T = TypeVar("T")
 
 
 class AircraftArrays(NamedTuple):
@@ -136,8 +137,8 @@ class FilterModel(NamedTuple):
     states: StateLayout
 
 
-class AirPoint(NamedTuple):
-    """Known inputs at one time.
+class AirInputs(NamedTuple, Generic[T]):
+    """Known inputs, numbers at one time or (points,) each on the filter's grid.
 
     Attributes
     ----------
@@ -148,25 +149,19 @@ class AirPoint(NamedTuple):
     lift, moment : increments of CL and Cm [-].
     """
 
-    elevator_rad: float
-    airspeed_m_s: float
-    ground_m_s: float
-    qbar_pa: float
-    theta_rad: float
-    lift: float
-    moment: float
+    elevator_rad: T
+    airspeed_m_s: T
+    ground_m_s: T
+    qbar_pa: T
+    theta_rad: T
+    lift: T
+    moment: T
 
 
-class GridSignals(NamedTuple):
-    """The same on the filter's grid, (points,) each."""
-
-    elevator_rad: Array
-    airspeed_m_s: Array
-    ground_m_s: Array
-    qbar_pa: Array
-    theta_rad: Array
-    lift: Array
-    moment: Array
+AirPoint: TypeAlias = AirInputs[float]
+"""Inputs at one time."""
+GridSignals: TypeAlias = AirInputs[Array]
+"""Inputs on the filter's grid."""
 
 
 class KernelInput(NamedTuple):
@@ -198,6 +193,7 @@ class KernelInput(NamedTuple):
 
 
 __all__ = [
+    "AirInputs",
     "AirPoint",
     "AircraftArrays",
     "AnyAircraft",

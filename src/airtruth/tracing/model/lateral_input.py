@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 
 class LateralAircraft(NamedTuple):
@@ -55,8 +56,8 @@ class LateralAircraft(NamedTuple):
     values: Array
 
 
-class LateralPoint(NamedTuple):
-    """Known inputs at one time.
+class LateralInputs(NamedTuple, Generic[T]):
+    """Known inputs, numbers at one time or (points,) each on the filter's grid.
 
     Attributes
     ----------
@@ -69,41 +70,26 @@ class LateralPoint(NamedTuple):
     side, roll, yaw : increments of CY, Cl and Cn [-].
     """
 
-    aileron_rad: float
-    rudder_rad: float
-    airspeed_m_s: float
-    ground_m_s: float
-    qbar_pa: float
-    alpha_rad: float
-    ground_attack_rad: float
-    theta_rad: float
-    q_rad_s: float
-    speed_rate_1_s: float
-    forward_m_s2: float
-    down_m_s2: float
-    side: float
-    roll: float
-    yaw: float
+    aileron_rad: T
+    rudder_rad: T
+    airspeed_m_s: T
+    ground_m_s: T
+    qbar_pa: T
+    alpha_rad: T
+    ground_attack_rad: T
+    theta_rad: T
+    q_rad_s: T
+    speed_rate_1_s: T
+    forward_m_s2: T
+    down_m_s2: T
+    side: T
+    roll: T
+    yaw: T
 
 
-class LateralGrid(NamedTuple):
-    """The inputs of `LateralPoint` on the filter's grid, (points,) each."""
+LateralPoint: TypeAlias = LateralInputs[float]
+"""Inputs at one time."""
+LateralGrid: TypeAlias = LateralInputs[Array]
+"""Inputs on the filter's grid."""
 
-    aileron_rad: Array
-    rudder_rad: Array
-    airspeed_m_s: Array
-    ground_m_s: Array
-    qbar_pa: Array
-    alpha_rad: Array
-    ground_attack_rad: Array
-    theta_rad: Array
-    q_rad_s: Array
-    speed_rate_1_s: Array
-    forward_m_s2: Array
-    down_m_s2: Array
-    side: Array
-    roll: Array
-    yaw: Array
-
-
-__all__ = ["LateralAircraft", "LateralGrid", "LateralPoint"]
+__all__ = ["LateralAircraft", "LateralGrid", "LateralInputs", "LateralPoint"]

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.physics.lateral_gusts import roll_deviation_rad_s
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.tracing.model.by_motion import register
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.kernel_input import GustModel
 from airtruth.tracing.model.lateral_equations import EQUATIONS
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid
-from airtruth.tracing.model.packing import AirPath, Packing
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralInputs
+from airtruth.tracing.model.packing import AirPath, Packing, turned_increments
 from airtruth.tracing.model.parameters import CommonEntries
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import Signals
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _STEPS: Final = 4
 """Steps that give the first climb [-] (judgement: each reduces its error by the square of the bank)."""
 
-register(LateralAircraft, LateralGrid, EQUATIONS)
+register(LateralAircraft, LateralInputs, EQUATIONS)
 
 
 def pack_lateral(
@@ -41,9 +41,6 @@ def pack_lateral(
     c, declared = plant.aircraft.constants, compiled.declared
     points, values = plant.stacked
     inertia = float(common[entries.inertia])
-    increments = common[entries.derivatives].copy()
-    for row in (LATERAL.row(x.name) for x in LATERAL.coefficients if x.length is not None):
-        increments[row] += inertia * (plant.turned[row] + common[row])
     ixx, izz = c.inertia_xx_kg_m2, c.inertia_zz_kg_m2
     ixz = c.inertia_xz_kg_m2 + declared["inertia_xz"] * math.sqrt(ixx * izz)
     return LateralAircraft(
@@ -63,7 +60,7 @@ def pack_lateral(
         load_y_m=declared["cg_y"] + declared["load_y"],
         yaw_moment_n_m=declared["yaw_moment"],
         constant=plant.constant,
-        increments=increments,
+        increments=turned_increments(plant, common, entries, inertia),
         alpha_rad=plant.alpha_rad,
         points=points,
         values=values,
@@ -96,7 +93,7 @@ def _over_ground(alpha_rad: Array, ground_m_s: Array, theta_rad: Array, s: Signa
 
     Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1 (h').
     """
-    if {"alpha_rad", "theta_rad", "az_m_s2"} & {*s.assumed}:
+    if {LONGITUDINAL.vane, "theta_rad", LONGITUDINAL.outputs[-1].channel} & {*s.assumed}:
         return alpha_rad
     outputs = dict(zip((y.name for y in s.motion.outputs), s.y.T, strict=True))
     beta, phi, ay = (on_grid(outputs[name], s.sub) for name in ("beta", "phi", "ay"))
@@ -123,14 +120,14 @@ def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
 
 
 def _known(s: Signals, compiled: CompiledChange, air: AirPath) -> Sequence[Array]:
-    """Known inputs of `LateralGrid`."""
-    alpha, q = _angle_of_attack(compiled, s), compiled.undone("q_rad_s", s.q_rad_s)
+    """Known inputs of `LateralInputs`."""
+    alpha, q = _angle_of_attack(compiled, s), compiled.undone(LONGITUDINAL.gyros[0], s.q_rad_s)
     v, ground, qbar, theta = air
     turned = _over_ground(alpha, ground, theta, s)
     return v, ground, qbar, alpha, turned, theta, q, _relative_rate(ground, s), s.ax_m_s2, s.az_m_s2
 
 
-PACKING: Final = Packing(LateralGrid, _known, pack_lateral, side_gusts)
+PACKING: Final = Packing(LateralInputs, _known, pack_lateral, side_gusts)
 """Packing of records of the lateral-directional motion."""
 
 __all__ = ["PACKING", "pack_lateral", "side_gusts"]

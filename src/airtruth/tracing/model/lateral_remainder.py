@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft.probe import Constants
-from airtruth.physics.lateral import places
+from airtruth.physics.linear_model import places
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.motion_parts import reference_length_m
 from airtruth.simulation.disposable import isolated_flight

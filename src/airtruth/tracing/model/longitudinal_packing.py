@@ -7,10 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.model.compile import CompiledChange
-from airtruth.tracing.model.kernel_input import AircraftArrays, GridSignals
-from airtruth.tracing.model.packing import Packing
+from airtruth.tracing.model.kernel_input import AircraftArrays, AirInputs
+from airtruth.tracing.model.packing import Packing, turned_increments
 from airtruth.tracing.model.parameters import SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.plant import Plant
 
@@ -22,12 +21,9 @@ def pack_aircraft(
 ) -> AircraftArrays:
     """The declared aircraft of a flight condition, with its changes and increments."""
     c, declared = plant.aircraft.constants, compiled.declared
-    moment = LONGITUDINAL.row("Cm")
     (table,), trims = plant.tables, plant.trims
     alpha, control, rate = table.axes
     inertia = float(common[entries.inertia])
-    increments = common[entries.derivatives].copy()
-    increments[moment] += inertia * (plant.turned[moment] + common[moment])
     return AircraftArrays(
         area_m2=c.wing_area_m2,
         chord_m=c.chord_m,
@@ -36,13 +32,13 @@ def pack_aircraft(
         trim_alpha_rad=plant.trim_alpha_rad,
         trim_elevator_rad=trims[table.signals[1]],
         neutral_elevator_rad=float(plant.neutral_rad[0]),
-        effectiveness=declared["elevator"],
+        effectiveness=declared[plant.motion.controls[0].name],
         cg_shift=declared["cg"],
         thrust_arm_m=declared["thrust_arm"],
         thrust_n=float(plant.power.thrust[0]),
         thrust_slope_m2=float(plant.power.thrust[1]),
         constant=plant.constant + common[entries.thrust] * plant.power.constant,
-        increments=increments,
+        increments=turned_increments(plant, common, entries, inertia),
         alpha_rad=alpha,
         elevator_rad=control,
         qhat=rate,
@@ -50,7 +46,7 @@ def pack_aircraft(
     )
 
 
-PACKING: Final = Packing(GridSignals, lambda s, compiled, air: air, pack_aircraft)
+PACKING: Final = Packing(AirInputs, lambda s, compiled, air: air, pack_aircraft)
 """Packing of records of the pitch plane."""
 
 __all__ = ["PACKING", "pack_aircraft"]

@@ -32,6 +32,14 @@ class AirPath(NamedTuple):
     theta_rad: Array
 
 
+def turned_increments(plant: Plant, common: Array, entries: CommonEntries, inertia: float) -> Array:
+    """(derivatives,) increments; a relative change of the inertia at equal accelerations adds to those of its coefficients."""
+    increments = common[entries.derivatives].copy()
+    for row in (plant.motion.row(c.name) for c in plant.motion.coefficients if c.length is not None):
+        increments[row] += inertia * (plant.turned[row] + common[row])
+    return increments
+
+
 class Packing(NamedTuple):
     """Packing of the records of one motion.
 
@@ -49,4 +57,4 @@ class Packing(NamedTuple):
     gusts: Callable[[GustModel, float], GustModel] = lambda vertical, span_m: vertical
 
 
-__all__ = ["AirPath", "Packing"]
+__all__ = ["AirPath", "Packing", "turned_increments"]

@@ -21,7 +21,7 @@ from airtruth.simulation.probe import ForceGrid, forces_at_speeds
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.model.declared import declared_covariance
-from airtruth.tracing.model.plant import FLOW, LAYOUTS, Engines, ForceTable, Plant
+from airtruth.tracing.model.plant import FLOW, FORCES, LAYOUTS, Engines, ForceTable, Plant
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -182,7 +182,7 @@ def engines(aircraft: Aircraft, at: Trim) -> Engines:
 
 def _engines_of(at: Trim, at_speeds: Array) -> Engines:
     fitted = _lines(at, at_speeds)
-    return Engines(np.ascontiguousarray(fitted[0, :3]), np.ascontiguousarray(fitted[:, 3]))
+    return Engines(np.ascontiguousarray(fitted[0, :FORCES]), np.ascontiguousarray(fitted[:, FORCES]))
 
 
 def _pressure(at: Trim) -> float:

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.channels import BANK
 from airtruth.checks.airspeed import low_passed, speeds
 from airtruth.errors import LogError
 from airtruth.identification.lateral.observation import known_inputs
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.numerics.whiteness import is_white, noise_at_rest
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.physics.motion_parts import Control
 from airtruth.tracing.model.damper import damper_surface, find_damper
 from airtruth.tracing.model.records import FINE, OF_OTHER_MOTION, Signals, fine
@@ -144,13 +145,14 @@ def _completed(logged: Mapping[str, Array], t_s: Array, dt_s: float) -> dict[str
     batch = Batch(("",), dt_s, t_s[None], {name: np.asarray(x)[None] for name, x in logged.items()})
     known = known_inputs(batch)
     made = {
-        "alpha_rad": known.alpha,
+        LONGITUDINAL.vane: known.alpha,
         "theta_rad": known.theta,
-        "q_rad_s": known.q,
+        LONGITUDINAL.gyros[0]: known.q,
         "ax_m_s2": G0 * np.sin(known.theta),
-        "az_m_s2": -logged["airspeed_m_s"] * known.q - G0 * np.cos(known.theta) * np.cos(known.phi),
-        "beta_rad": known.beta,
-        "phi_rad": known.phi,
+        LONGITUDINAL.outputs[-1].channel: -logged["airspeed_m_s"] * known.q
+        - G0 * np.cos(known.theta) * np.cos(known.phi),
+        LATERAL.vane: known.beta,
+        BANK: known.phi,
     }
     return {name: x[0] for name, x in made.items()} | dict(logged)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.checks.airspeed import WalkInNoise
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.tracing.model.plant import Plant
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ _HEAD_S: Final = 0.1
 _HEAD_SAMPLES: Final = 3
 """Least number of samples of that start [-] (judgement)."""
 
-OF_OTHER_MOTION: Final = ("alpha_rad", "q_rad_s", "ax_m_s2", "az_m_s2")
+OF_OTHER_MOTION: Final = tuple(name for name in LATERAL.known if name not in LONGITUDINAL.known)
 """Channels of the pitch plane that are known inputs of the other motion."""
 _SERIES: Final = (
     "controls_rad",
@@ -104,9 +104,9 @@ class Signals:
         return np.asarray(self.controls_rad[0])
 
     @property
-    def sampled_elevator_rad(self) -> Array:
-        """(samples,) the one control of the pitch plane at the samples [rad]."""
-        return np.asarray(self.sampled_controls_rad[0])
+    def attack_rad(self) -> Array:
+        """(points,) angle of attack, an output or a known input of the motion, on the filter's grid [rad]."""
+        return self.alpha_rad if self.alpha_rad.size else fine(self.y[:, 0], self.sub)
 
     @property
     def with_lead(self) -> Signals:

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.physics.readings import state_of
-from airtruth.physics.terms import ELEVATOR
 from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.replay import each_flown_through
 from airtruth.simulation.tracks import Track, substeps
@@ -124,7 +123,10 @@ def track_of(signals: Signals) -> Track:
         substeps=steps,
         outputs={},
         weight={},
-        controls_rad={ELEVATOR: on_grid(signals.elevator_rad, signals.sub * FINE)},
+        controls_rad={
+            control.name: on_grid(x, signals.sub * FINE)
+            for control, x in zip(signals.motion.controls, signals.controls_rad, strict=True)
+        },
         airspeed_m_s=on_grid(signals.airspeed_m_s, signals.sub),
     )
 

@@ -28,7 +28,6 @@ from airtruth.tracing.model.kernel_input import (
 from airtruth.tracing.model.packing import AirPath, Packing
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
-from airtruth.tracing.model.records import fine as on_grid
 from airtruth.tracing.model.schedule import Schedule, schedule
 from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.steady import SteadyFilter, steady_filter
@@ -190,8 +189,7 @@ def _airspeed(compiled: CompiledChange, s: Signals) -> Array:
     errors = compiled.inputs.get("airspeed_m_s")
     if errors is None:
         return s.airspeed_m_s
-    alpha = s.alpha_rad if s.alpha_rad.size else on_grid(s.y[:, 0], s.sub)
-    return errors.unscaled(s.airspeed_m_s) / errors.slope(alpha)
+    return errors.unscaled(s.airspeed_m_s) / errors.slope(s.attack_rad)
 
 
 def respond(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.band_limited import band_limited, is_band_limited
-from airtruth.numerics.intersample import servo_bend, servo_decay
+from airtruth.numerics.intersample import servo_bend, servo_decay, smooth_bend
 from airtruth.tracing.model.servo_surface import (
     held_command,
     is_held,
@@ -88,8 +88,7 @@ def read_between(
 def _bent(surface: Array, bend: Array, sub: int, corners: Array) -> Array:
     """Parabolas of the cubic's area; straight beside a corner, because the samples across it say nothing of the cell."""
     relative = surface - surface[0]
-    edge = np.concatenate([relative[:1], relative, relative[-1:]])
-    cubic = (edge[1:-2] + edge[2:-1] - edge[:-3] - edge[3:]) / 24.0
+    cubic = smooth_bend(relative)[1:]
     if corners.size:
         at = np.pad(corners[1:] > 0.0, 1)
         cubic[at[:-2] | at[1:-1] | at[2:]] = 0.0
