@@ -185,7 +185,7 @@ def _pitches(c: Mapping[str, Array], dt_s: float) -> SlotFinding:
 
 
 def changes(control: Control) -> str:
-    """What a surface does to the rate that it controls, in words."""
+    """Effect of a surface on the rate that it controls, in words."""
     return f"the {control.name} changes {SIGNALS[control.damped].stem}'"
 
 

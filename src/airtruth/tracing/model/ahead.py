@@ -21,7 +21,7 @@ from airtruth.tracing.model.kernel_input import (
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralInputs
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralAirInputs
 from airtruth.tracing.model.lateral_slopes import LateralMoves
 from airtruth.tracing.model.linearise import FirstUpdate, linearise
 from airtruth.tracing.model.parameters import ParameterLayout, core_states, state_layout
@@ -96,7 +96,7 @@ def _side() -> _Kind:
     about = [signals, controls, controls, *[0.0] * 4, table[0, 0], increments]
     aircraft = LateralAircraft._make([*[1.0] * 8, *about, _AXIS, points, table])
     moves = LateralMoves(1.0, increments, 0.0, states, states)
-    return _Kind(motion, aircraft, LateralInputs, moves)
+    return _Kind(motion, aircraft, LateralAirInputs, moves)
 
 
 def _linearise(kind: _Kind) -> None:

@@ -37,7 +37,6 @@ from airtruth.tracing.model.kernel_input import (
     AirPoint,
     EffectArrays,
     FilterModel,
-    GridSignals,
 )
 from airtruth.tracing.model.parameters import GUST_1, OUTPUTS
 from airtruth.units import G0
@@ -285,7 +284,7 @@ def settle_effects(x: Array, at: AirPoint, model: FilterModel) -> None:
 
 
 @inner
-def air_at(grid: GridSignals, point: int) -> AirPoint:
+def air_at(grid: AirInputs[Array], point: int) -> AirPoint:
     """Inputs at a point of the filter's grid."""
     return AirInputs(
         grid.elevator_rad[point],

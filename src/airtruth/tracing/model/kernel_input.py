@@ -122,9 +122,9 @@ class SensorArrays(NamedTuple):
 AnyAircraft: TypeAlias = Any
 """The aircraft of a motion: `AircraftArrays` or `LateralAircraft`."""
 AnyPoint: TypeAlias = Any
-"""Inputs of a motion at one time: `AirPoint` or `LateralPoint`."""
+"""Inputs of a motion at one time: `AirInputs` or `LateralAirInputs` of numbers."""
 AnyGrid: TypeAlias = Any
-"""Inputs of a motion on the filter's grid: `GridSignals` or `LateralGrid`."""
+"""Inputs of a motion on the filter's grid: `AirInputs` or `LateralAirInputs` of arrays."""
 
 
 class FilterModel(NamedTuple):
@@ -160,8 +160,6 @@ class AirInputs(NamedTuple, Generic[T]):
 
 AirPoint: TypeAlias = AirInputs[float]
 """Inputs at one time."""
-GridSignals: TypeAlias = AirInputs[Array]
-"""Inputs on the filter's grid."""
 
 
 class KernelInput(NamedTuple):
@@ -201,7 +199,6 @@ __all__ = [
     "AnyPoint",
     "EffectArrays",
     "FilterModel",
-    "GridSignals",
     "GustModel",
     "KernelInput",
     "SensorArrays",

@@ -47,7 +47,7 @@ from airtruth.tracing.model.equations import (
 )
 from airtruth.tracing.model.gust_states import gust_of, gust_rates
 from airtruth.tracing.model.kernel_input import EffectArrays, FilterModel
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid, LateralInputs, LateralPoint
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralAirInputs, LateralPoint
 from airtruth.tracing.model.parameters import core_of
 from airtruth.units import G0
 
@@ -286,9 +286,9 @@ def outputs(x: Array, rate: Array, ay: float, at: LateralPoint, model: FilterMod
 
 
 @inner
-def air_at(grid: LateralGrid, point: int) -> LateralPoint:
+def air_at(grid: LateralAirInputs[Array], point: int) -> LateralPoint:
     """Inputs at a point of the filter's grid."""
-    return LateralInputs(
+    return LateralAirInputs(
         aileron_rad=grid.aileron_rad[point],
         rudder_rad=grid.rudder_rad[point],
         airspeed_m_s=grid.airspeed_m_s[point],
@@ -319,7 +319,7 @@ def signals_at(x: Array, at: LateralPoint, rate: float, model: FilterModel, out:
 @inner
 def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
     """See `airtruth.tracing.model.by_motion.shifted`; the fields between the controls and the coefficients stay."""
-    return LateralInputs(
+    return LateralAirInputs(
         aileron_rad=at.aileron_rad + (by if field == 0 else 0.0),
         rudder_rad=at.rudder_rad + (by if field == 1 else 0.0),
         airspeed_m_s=at.airspeed_m_s,
@@ -369,7 +369,7 @@ EQUATIONS: Final = MotionEquations(
     settle=settle_effects,
     shifted=shifted,
     signals_at=signals_at,
-    point=LateralInputs,
+    point=LateralAirInputs,
     coefficients=COEFFICIENTS,
     has_roll_gust=True,
 )

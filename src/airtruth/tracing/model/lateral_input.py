@@ -56,7 +56,7 @@ class LateralAircraft(NamedTuple):
     values: Array
 
 
-class LateralInputs(NamedTuple, Generic[T]):
+class LateralAirInputs(NamedTuple, Generic[T]):
     """Known inputs, numbers at one time or (points,) each on the filter's grid.
 
     Attributes
@@ -87,9 +87,7 @@ class LateralInputs(NamedTuple, Generic[T]):
     yaw: T
 
 
-LateralPoint: TypeAlias = LateralInputs[float]
+LateralPoint: TypeAlias = LateralAirInputs[float]
 """Inputs at one time."""
-LateralGrid: TypeAlias = LateralInputs[Array]
-"""Inputs on the filter's grid."""
 
-__all__ = ["LateralAircraft", "LateralGrid", "LateralInputs", "LateralPoint"]
+__all__ = ["LateralAirInputs", "LateralAircraft", "LateralPoint"]

@@ -15,7 +15,7 @@ from airtruth.tracing.model.by_motion import register
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.kernel_input import GustModel
 from airtruth.tracing.model.lateral_equations import EQUATIONS
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralInputs
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralAirInputs
 from airtruth.tracing.model.packing import AirPath, Packing, turned_increments
 from airtruth.tracing.model.parameters import CommonEntries
 from airtruth.tracing.model.plant import Plant
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _STEPS: Final = 4
 """Steps that give the first climb [-] (judgement: each reduces its error by the square of the bank)."""
 
-register(LateralAircraft, LateralInputs, EQUATIONS)
+register(LateralAircraft, LateralAirInputs, EQUATIONS)
 
 
 def pack_lateral(
@@ -120,14 +120,14 @@ def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
 
 
 def _known(s: Signals, compiled: CompiledChange, air: AirPath) -> Sequence[Array]:
-    """Known inputs of `LateralInputs`."""
+    """Known inputs of `LateralAirInputs`."""
     alpha, q = _angle_of_attack(compiled, s), compiled.undone(LONGITUDINAL.gyros[0], s.q_rad_s)
     v, ground, qbar, theta = air
     turned = _over_ground(alpha, ground, theta, s)
     return v, ground, qbar, alpha, turned, theta, q, _relative_rate(ground, s), s.ax_m_s2, s.az_m_s2
 
 
-PACKING: Final = Packing(LateralInputs, _known, pack_lateral, side_gusts)
+PACKING: Final = Packing(LateralAirInputs, _known, pack_lateral, side_gusts)
 """Packing of records of the lateral-directional motion."""
 
 __all__ = ["PACKING", "pack_lateral", "side_gusts"]
