@@ -250,7 +250,7 @@ class _BestFirst:
             (frozenset(e.key for e in x.last.hypothesis.effects), self._told_by(x)) for x in self._expansions
         ]
         found: dict[frozenset[str], EvaluatedSet] = {}
-        for key in {key for _, every in told for key in every}:
+        for key in dict.fromkeys(key for _, every in told for key in every):
             nearest = min(len(own ^ key) for own, _ in told)
             by_nearest = (every.get(key) for own, every in told if len(own ^ key) == nearest)
             known = [p for p in by_nearest if p is not None]
