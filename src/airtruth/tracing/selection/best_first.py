@@ -163,13 +163,11 @@ class _BestFirst:
         if effects and may_begin(self.advance, f"refit {' + '.join(e.key for e in effects)}"):
             self._from_declared(effects, [e.parameters[0].size(known[e.key]) for e in effects])
 
-    def _from_declared(
-        self, effects: tuple[Effect, ...], sizes: Sequence[float], rival: float = np.inf
-    ) -> PosteriorFit | None:
-        """Refit a set from the declared aircraft, unless its cost cannot reach that of a rival."""
+    def _from_declared(self, effects: tuple[Effect, ...], sizes: Sequence[float]) -> PosteriorFit | None:
+        """Refit a set from the declared aircraft."""
         hypothesis = replace(self.hypothesis, effects=effects)
         self.refits += 1
-        return self._enter(self.sets.fit_from_declared(hypothesis, np.array(sizes), self.null, rival))
+        return self._enter(self.sets.fit_from_declared(hypothesis, np.array(sizes), self.null))
 
     def _is_overfitted(self, fitted: PosteriorFit) -> bool:
         """Whether records left out refuse a possible fit: another set may explain them all.
@@ -186,19 +184,16 @@ class _BestFirst:
     def _sweep(self) -> None:
         """Refit every effect alone from the declared aircraft, until one of them leaves no anomaly beyond doubt.
 
-        About a fit that lacks a large effect no quadratic shows it. Its gain bounds its evidence, so that a refit ends once it
-        cannot come within the odds of the best set.
+        About a fit that lacks a large effect no quadratic shows it. Nor does the way of a refit before it ends: its cost may be
+        far above that of the null when it turns to the optimum.
         """
-        bare = max(p.weighed.log_evidence for p in self._of_fit(frozenset()))
-        lead = self._best().weighed.log_evidence - bare + float(np.log(CRITERION.level))
-        rival = self.null.cost - self.temper * lead
         for effect in self.effects:
             first = effect.parameters[0]
             if frozenset((effect.key,)) in self._fits or len(effect.parameters) > 1:
                 continue
             if not may_begin(self.advance, f"refit {effect.key}"):
                 return
-            own = self._from_declared((effect,), [(first.sign or 1.0) * first.material], rival)
+            own = self._from_declared((effect,), [(first.sign or 1.0) * first.material])
             if own is not None and own.cost < self.null.cost and not self._is_misfit(own):
                 return
 

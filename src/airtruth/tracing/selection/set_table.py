@@ -77,32 +77,26 @@ class SetTable:
         return own if known.converged else self.fit_from(hypothesis, own.point, near=own)
 
     def fit_from(
-        self,
-        hypothesis: Hypothesis,
-        start: Parameters,
-        *,
-        near: PosteriorFit | None = None,
-        rival: float = np.inf,
+        self, hypothesis: Hypothesis, start: Parameters, *, near: PosteriorFit | None = None
     ) -> PosteriorFit | None:
         """The fit of a set from a start, which may lead to another optimum; the table keeps the better.
 
-        A start that was tried before leads nowhere else: the answer is the best fit of the set. Parameters as of
-        `airtruth.tracing.inference.optimise.fit`. None where the fit cannot begin, or does not reach a rival.
+        A start that was tried before leads nowhere else: the answer is the best fit of the set. Parameters and None as of
+        `airtruth.tracing.inference.optimise.fit`.
         """
         key = key_of(hypothesis)
         begin = key, _in_order(start, hypothesis, sorted(hypothesis.effects, key=_name)).vector.tobytes()
         known = self._best.get(key)
         if known is not None and known.converged and begin in self._tried:
             return in_order_of(known, hypothesis)
-        own = fit(self.problem, hypothesis, start, near=near, rival=rival, only_better=rival < np.inf)
-        if own is None or own.cost > rival:
-            return None
-        self._tried.add(begin)
-        self.keep(own)
+        own = fit(self.problem, hypothesis, start, near=near)
+        if own is not None:
+            self._tried.add(begin)
+            self.keep(own)
         return own
 
     def fit_from_declared(
-        self, hypothesis: Hypothesis, sizes: Array, null: PosteriorFit, rival: float = np.inf
+        self, hypothesis: Hypothesis, sizes: Array, null: PosteriorFit
     ) -> PosteriorFit | None:
         """`fit_from` the declared aircraft, and not from a null, which may have absorbed an effect.
 
@@ -111,10 +105,9 @@ class SetTable:
         Parameters
         ----------
         sizes : of the effects, at which the search begins; null : a fit whose derivatives the first steps use.
-        rival : cost that the fit has to reach.
         """
         start = initial_parameters(self.problem, hypothesis, sizes, _FIRST_ITERATIONS).with_levels(null.point)
-        return self.fit_from(hypothesis, start, near=null, rival=rival)
+        return self.fit_from(hypothesis, start, near=null)
 
     def converged(
         self, hypothesis: Hypothesis, start: Parameters, *, near: PosteriorFit | None = None
