@@ -54,23 +54,18 @@ def trace_outputs(
         yield declared
         return
     from airtruth.physics.motion import FOLDERS
+    from airtruth.reporting import TRACE_PAGE
+    from airtruth.tracing.answer import ANSWER
+    from airtruth.tracing.presentation.files import EVIDENCE
 
     with writing(command, [*log_files(logs), *aircraft_files(declared)], force=force) as outputs:
         for name in FOLDERS:
             own = out / name if name else out
             folder = own / "trace" if command == "loop" else own
-            outputs.require(*(folder / file for file in _trace_names()))
+            outputs.require(*(folder / file for file in (ANSWER, TRACE_PAGE, *EVIDENCE)))
             if command == "loop":
                 from airtruth.loop import OUTPUTS
 
                 outputs.require(*(own / file for file in OUTPUTS))
             outputs.require_folder(folder / "aircraft" / declared.name)
         yield declared
-
-
-def _trace_names() -> tuple[str, ...]:
-    from airtruth.reporting import TRACE_PAGE
-    from airtruth.tracing.answer import ANSWER
-    from airtruth.tracing.presentation.files import EVIDENCE
-
-    return (ANSWER, TRACE_PAGE, *EVIDENCE)

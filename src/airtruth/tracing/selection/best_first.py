@@ -184,8 +184,8 @@ class _BestFirst:
     def _sweep(self) -> None:
         """Refit every effect alone from the declared aircraft, until one of them leaves no anomaly beyond doubt.
 
-        About a fit that lacks a large effect no quadratic shows it. Each refit is completed, because its cost may be far above that
-        of the null until the search turns to the optimum.
+        About a fit that lacks a large effect no quadratic shows it. Each refit is completed, because its cost may be far above
+        that of the null until the search turns to the optimum.
         """
         for effect in self.effects:
             first = effect.parameters[0]
