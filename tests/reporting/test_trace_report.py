@@ -270,6 +270,17 @@ def test_files_are_written_whole(found, tmp_path):
         assert (tmp_path / "new" / name).read_bytes() == (folder / name).read_bytes()
 
 
+def test_the_first_page_has_a_link_to_that_of_another_motion(found, tmp_path):
+    """The same result serves for both motions."""
+    result, _ = found
+    folders = (tmp_path, tmp_path / "lateral")
+    folders[1].mkdir()
+    reporting.draw_traces(dict.fromkeys(folders, result))
+    first, second = ((folder / reporting.TRACE_PAGE).read_text() for folder in folders)
+    assert 'href="lateral/trace.html"' in first
+    assert 'href="lateral/trace.html"' not in second
+
+
 def test_records_hold_every_stage_of_every_record(found):
     """The root mean squares of trace.json are those of the residuals of the file."""
     result, folder = found
