@@ -3,7 +3,7 @@
 No room may exceed its cap. Lower the cap of a room whose count has fallen; the test prints the total.
 
 Two words of an axis have other meanings, and the modules of `HOMONYMS` use them in these alone. A moment is also a moment of
-statistics: a sum of products whose roots are estimates. In four modules it is the kind of every coefficient with a reference
+statistics: a sum of products whose roots are estimates. In two modules it is the kind of every coefficient with a reference
 length, whatever its motion. A chord is also a step of Newton's method with the derivatives of an earlier one.
 """
 
@@ -28,14 +28,12 @@ HOME = (
 """Modules that describe an axis or hold its algebra: motions, parts of the aircraft, effects and estimators."""
 HOMONYMS = {
     "moment": (
-        "aircraft/jsbsim/lateral_axes.py",
         "checks/kinematics_fit.py",
         "checks/kinematics_search.py",
         "checks/spectra.py",
         "identification/lateral/problems.py",
         "identification/lateral/solve.py",
         "identification/likelihood/cramer_rao.py",
-        "tracing/anomalies/families.py",
         "tracing/inference/posterior.py",
         "tracing/model/declared.py",
         "tracing/model/surface_noise.py",

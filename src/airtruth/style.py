@@ -1,7 +1,7 @@
 """Theme of all figures: readable type, colours that colour-blind readers can tell apart, files written whole.
 
-Matplotlib takes half a second to import, so that the first figure imports it. A ``plot()`` method draws in this way, without
-pyplot and its global state::
+Matplotlib takes half a second to import; the first figure imports it. A ``plot()`` method draws in this way, without pyplot
+and its global state::
 
     @style.themed
     def plot(self) -> Figure:

@@ -135,6 +135,8 @@ def _fitted(
     ----------
     low, high : ends of the table, between which a location lies.
     """
+    from scipy.optimize import least_squares  # slow to import, and only learned increments need it
+
     if len(x) <= count:
         return None
     span = high - low
@@ -147,8 +149,6 @@ def _fitted(
         starts.append((float(np.sum((size * unit - aim) ** 2)), np.array([size, *others])))
     start = min(starts, key=lambda found: found[0])[1]
     bounds = (np.array([-np.inf, low, 0.0])[:count], np.array([np.inf, high, np.inf])[:count])
-    from scipy.optimize import least_squares  # slow to import, and only learned increments need it
-
     scale = np.array([max(abs(start[0]), 1e-12), span, span])[:count]
     solved = least_squares(lambda p: (form(x, p) - y) / s, start, x_scale=scale, bounds=bounds)
     return solved.x, 2.0 * float(solved.cost)

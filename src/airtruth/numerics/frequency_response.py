@@ -82,7 +82,7 @@ def frequency_response(
     x, y = (np.stack([np.asarray(one[:n], dtype=np.float64) for one in own]) for own in (inputs, outputs))
     f: Array = np.asarray(np.fft.rfftfreq(n, dt_s), dtype=np.float64)
     of_x, of_y = _transformed(x), _transformed(y)
-    # a line stands for its negative frequency too
+    # every line but those of the mean and of the Nyquist frequency has a negative twin
     sides = np.where((f > 0.0) & (2 * np.arange(len(f)) < n), 2.0, 1.0)
     sxy = sides * of_x.conj() * of_y
     sxx, syy = (sides * np.abs(one) ** 2 for one in (of_x, of_y))
@@ -111,7 +111,10 @@ _LEAST_SAMPLES: Final = 16
 
 
 def _transformed(records: Array) -> NDArray[np.complex128]:
-    """(records, lines) Fourier transforms, the linear trend removed and the ends tapered by half a period of a cosine."""
+    """(records, lines) Fourier transforms, the linear trend removed and the ends tapered by half a period of a cosine.
+
+    That is one segment of `scipy.signal.csd`, whose import would take half a second of every trace.
+    """
     n = records.shape[1]
     time = np.linspace(-1.0, 1.0, n)
     level = records.mean(axis=1, keepdims=True)

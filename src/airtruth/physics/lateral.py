@@ -17,7 +17,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.linear_model import BodyConstants, Linear, Structure, bare, places
+from airtruth.physics.linear_model import BodyConstants, Linear, Structure, assembled, bare, places
 from airtruth.physics.motion import LATERAL
 from airtruth.units import G0
 
@@ -135,20 +135,7 @@ def lateral_system(theta: Array, s: LateralScale) -> Linear:
     theta : (..., 15) derivatives in the order of ``LATERAL.parameters`` [-].
     s : factors of shape (...).
     """
-    own = structure(s)
-    th = np.asarray(theta, dtype=np.float64).reshape(*np.shape(theta)[:-1], *LATERAL.shape)
-    by_signal = th * own.rates[..., None, :]
-    of_rates, of_outputs = own.forces @ by_signal, own.accelerations @ by_signal
-    shape = of_rates.shape[:-2]
-    a = np.zeros((*shape, 4, 4)) + own.kinematics
-    c = np.zeros((*shape, len(LATERAL.outputs), 4)) + own.seen
-    b = np.zeros((*shape, 4, len(LATERAL.controls)))
-    d = np.zeros((*shape, len(LATERAL.outputs), len(LATERAL.controls)))
-    for column, (is_state, number) in enumerate(places(LATERAL)):
-        rows, outputs = (a, c) if is_state else (b, d)
-        rows[..., number] += of_rates[..., column]
-        outputs[..., number] += of_outputs[..., column]
-    return Linear(a, b, c, d)
+    return assembled(LATERAL, structure(s), theta)
 
 
 def lateral_modal(theta: Array, s: LateralScale) -> Array:

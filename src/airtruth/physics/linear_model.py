@@ -74,6 +74,28 @@ def bare(motion: Motion, half_time_s: Array) -> Structure:
     )
 
 
+def assembled(motion: Motion, own: Structure, theta: Array) -> Linear:
+    """The linear model of derivatives.
+
+    Parameters
+    ----------
+    own : the rest of the model, of shape (...).
+    theta : (..., derivatives) in the order of the motion's parameters [-].
+    """
+    th = np.asarray(theta, dtype=np.float64).reshape(*np.shape(theta)[:-1], *motion.shape)
+    by_signal = th * own.rates[..., None, :]
+    of_rates, of_outputs = own.forces @ by_signal, own.accelerations @ by_signal
+    shape, controls = of_rates.shape[:-2], len(motion.controls)
+    a = np.zeros((*shape, *own.kinematics.shape[-2:])) + own.kinematics
+    c = np.zeros((*shape, *own.seen.shape)) + own.seen
+    b, d = (np.zeros((*shape, x.shape[-2], controls)) for x in (own.forces, own.accelerations))
+    for column, (is_state, number) in enumerate(places(motion)):
+        rows, outputs = (a, c) if is_state else (b, d)
+        rows[..., number] += of_rates[..., column]
+        outputs[..., number] += of_outputs[..., column]
+    return Linear(a, b, c, d)
+
+
 def places(motion: Motion) -> tuple[tuple[bool, int], ...]:
     """For each signal of a motion whether it is a state, and its number among the states or controls.
 
@@ -91,4 +113,4 @@ def places(motion: Motion) -> tuple[tuple[bool, int], ...]:
     )
 
 
-__all__ = ["BodyConstants", "Linear", "Structure", "bare", "places"]
+__all__ = ["BodyConstants", "Linear", "Structure", "assembled", "bare", "places"]

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.linear_model import BodyConstants, Linear, Structure, bare
+from airtruth.physics.linear_model import BodyConstants, Linear, Structure, assembled, bare
 from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
@@ -118,16 +118,13 @@ def normal_force_row(theta: Array, s: Scale) -> Array:
 
 
 def linear_system(theta: Array, s: Scale) -> Linear:
-    """The linear model of derivatives: `system` and `normal_force_row`.
+    """The linear model of derivatives, that of `system` and `normal_force_row`.
 
     Parameters
     ----------
     theta : (..., 6) derivatives [-]; s : factors of shape (...).
     """
-    (a, b), row, seen = system(theta, s), normal_force_row(theta, s)[..., None, :], np.eye(2)
-    c = np.concatenate([np.zeros_like(a) + seen, row[..., :-1]], axis=-2)
-    d = np.concatenate([np.zeros_like(b[..., None]), row[..., -1:]], axis=-2)
-    return Linear(a, b[..., None], c, d)
+    return assembled(LONGITUDINAL, structure(s), theta)
 
 
 def structure(s: Scale) -> Structure:

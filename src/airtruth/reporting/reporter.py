@@ -89,11 +89,10 @@ def draw_traces(results: Mapping[Path, TraceResult]) -> None:
     from airtruth.reporting.pages.page import linked
     from airtruth.reporting.pages.trace_page import trace_report
 
-    links: dict[str, str] = {}
-    for folder, result in reversed([*results.items()]):
+    links = {result.motion: f"{folder.name}/{TRACE_PAGE}" for folder, result in [*results.items()][1:]}
+    for number, (folder, result) in enumerate(results.items()):
         page = trace_report(result.answer, result.histories).page
-        write_text(folder / TRACE_PAGE, linked(page, links))
-        links[result.motion] = f"{folder.name}/{TRACE_PAGE}"
+        write_text(folder / TRACE_PAGE, page if number else linked(page, links))
 
 
 # The pages are imported where they are needed: the tracer takes seconds, and `airtruth tables`, which imports this module as

@@ -28,7 +28,7 @@ from airtruth.tracing.run import answered, begun
 from airtruth.tracing.update import Revision, write_update
 
 Draw = Callable[[Mapping[Path, TraceResult]], None]
-"""Draws the result of each folder into it."""
+"""Draws each result into its folder."""
 
 
 @dataclass(frozen=True)
