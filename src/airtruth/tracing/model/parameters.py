@@ -110,7 +110,7 @@ class CommonEntries(Entries):
                     for d in motion.derivatives
                 ),
                 *(FreeEntry(f"log_noise_{name}", "-", 1e-4) for name in outputs),
-                FreeEntry("rotary", "-", 1e-3, (-0.5 if "p" in motion.gusts else -0.75, 0.75), 0.5),
+                FreeEntry("rotary", "-", 1e-3, (-0.45 if "p" in motion.gusts else -0.75, 0.75), 0.5),
                 FreeEntry("thrust", "-", 1e-3),
                 FreeEntry("rolloff", "-", *_PART),
                 FreeEntry("inertia", "-", 1e-3),

@@ -216,7 +216,7 @@ class _BestFirst:
 
     def _best(self) -> EvaluatedSet:
         """The most probable set whose refit records left out have not refused, as they never refuse the null."""
-        every = [p for key in self._fits for p in self._of_fit(key)]
+        every = [p for key in self._fits for p in self._compared(key)]
         left = [p for p in every if not any(p.expansion.last is fitted for fitted in self._refused)]
         return max(left, key=lambda p: p.weighed.log_evidence)
 
@@ -232,6 +232,14 @@ class _BestFirst:
                 self._read[at] = [EvaluatedSet(expansion, q, w) for w in own]
             found += self._read[at]
         return found
+
+    def _compared(self, key: frozenset[str]) -> list[EvaluatedSet]:
+        """The sets of a key, each explanation once: its refit, or its best prediction where it has none."""
+        compared: dict[tuple[tuple[int, ...], tuple[int, ...], float], EvaluatedSet] = {}
+        for p in sorted(self._of_fit(key), key=lambda p: (p.is_refitted, p.weighed.log_evidence)):
+            d = p.weighed.declaration
+            compared[p.weighed.columns, d.wrong, float(np.trace(d.spread))] = p  # the last one remains
+        return list(compared.values())
 
     def _predict(self, fitted: PosteriorFit) -> None:
         """Enter the quadratic about a fit among those that predict the other sets."""
@@ -378,13 +386,7 @@ class _BestFirst:
                 evaluated[names] = p
 
         for key in self._fits:
-            best: dict[tuple[tuple[int, ...], tuple[int, ...], float], EvaluatedSet] = {}
-            for p in sorted(self._of_fit(key), key=lambda p: (p.is_refitted, p.weighed.log_evidence)):
-                d = p.weighed.declaration
-                best[p.weighed.columns, d.wrong, float(np.trace(d.spread))] = (
-                    p  # the last one remains: a refit
-                )
-            for p in best.values():
+            for p in self._compared(key):
                 add(p)
         for key, p in self._predicted.items():
             if key not in self._fits and self._is_new(p):
