@@ -395,7 +395,7 @@ def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance(rota
     assert np.abs(correlation).max() < 5.0 / np.sqrt(len(values))
 
 
-def test_the_share_of_the_roll_gust_begins_at_none():
+def test_the_share_of_the_roll_gust_begins_at_a_twentieth():
     """The variance of p is even in the share, so that shares below none are those above it a second time."""
     record = lr.record(np.zeros((50, 5)), 0.0, 0.0)
     own = lr.per_record(level=0.8)
@@ -406,7 +406,7 @@ def test_the_share_of_the_roll_gust_begins_at_none():
     assert below - none == pytest.approx(above - none, rel=0.1)
     assert above > 1.05 * none
     common = lr.LAYOUT.common
-    assert common.bounds[common.rotary][0] == -0.5
+    assert common.bounds[common.rotary][0] == -0.45
 
 
 def test_the_roll_gust_is_driven_and_scaled_as_it_is_flown():

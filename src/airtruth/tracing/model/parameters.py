@@ -73,7 +73,7 @@ class Entries:
 
 _PART: Final = (1e-3, (-0.75, 0.75), 0.5)
 """Step, range and prior of a share less 1/2 [-] (judgement): none to all, and a quarter beyond for a form that is neither of the
-two. The share of a gust of its own begins at none, about which its variance is even, and a step beyond promises what it loses."""
+two. The share of a gust of its own is at least a twentieth: its variance is even in the share, without a slope at zero."""
 _STEPS: Final = {"rad": 1e-5, "rad_s": 1e-4, "m_s2": 1e-3}
 """Unit of a channel -> step of its bias and of its initial value [unit] (judgement)."""
 
