@@ -21,7 +21,7 @@ from airtruth.physics.terms import (
     SurfaceTerm,
     signals_of,
 )
-from airtruth.tracing.model.lateral_equations import LateralSignals
+from airtruth.tracing.model.lateral.equations import LateralSignals
 from airtruth.tracing.model.linearise import process_intensity
 from airtruth.tracing.model.steady import linearise_at_reference, steady_filter
 from airtruth.units import DEG, G0

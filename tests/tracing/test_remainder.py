@@ -15,12 +15,12 @@ from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.trim import trim
+from airtruth.tracing.model.longitudinal.remainder import remainders
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.plant import looked_up
 from airtruth.tracing.model.probed import probed
 from airtruth.tracing.model.reading import read
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.model.remainder import remainders
 from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.model.settings import initial_per_record, settings_of
 from airtruth.units import DEG

@@ -13,7 +13,7 @@ from airtruth.tracing.conditions import with_mean_derivatives
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.longitudinal_packing import pack_aircraft
+from airtruth.tracing.model.longitudinal.packing import pack_aircraft
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.settings import common_prior
 from airtruth.units import DEG

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from airtruth.errors import ConfigurationError
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, StateTerm
-from airtruth.tracing.model.equations import gust, rates
-from airtruth.tracing.model.kernel_input import AirPoint
+from airtruth.tracing.model.longitudinal.equations import gust, rates
+from airtruth.tracing.model.longitudinal.input import AirPoint
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.model.settings import common_prior

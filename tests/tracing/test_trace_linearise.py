@@ -7,8 +7,8 @@ import pytest
 import trace_records as tr
 from scipy.linalg import block_diag, expm, solve_discrete_are
 
-from airtruth.tracing.model.kernel_input import AirPoint
 from airtruth.tracing.model.linearise import delay_system, gain, linearise, process_intensity
+from airtruth.tracing.model.longitudinal.input import AirPoint
 from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, SHORT_PERIOD, state_layout
 
 WHITE = np.array([0.0, 0.0, 0.0, 0.1])

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.numerics.compiled import inner
+
 Array = NDArray[np.float64]
 
 
@@ -22,4 +24,11 @@ def lower_point(axis: Array, x: float) -> int:
     return low
 
 
-__all__ = ["lower_point"]
+@inner
+def cell(axis: Array, x: float) -> tuple[int, float]:
+    """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
+    low = lower_point(axis, x)
+    return low, (x - axis[low]) / (axis[low + 1] - axis[low])
+
+
+__all__ = ["cell", "lower_point"]

@@ -15,11 +15,11 @@ from airtruth.errors import LogError, TrimError
 from airtruth.physics.gust_figures import gust_scales, side_gust
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.simulation.trim import Trim
-from airtruth.tracing.model.lateral_remainder import along_record, lateral_remainders
+from airtruth.tracing.model.lateral.remainder import along_record, lateral_remainders
+from airtruth.tracing.model.longitudinal.remainder import remainders
 from airtruth.tracing.model.plant import FLOW, Plant, declared_derivatives, linear
 from airtruth.tracing.model.probed import engines, probed, probed_lateral, trim_of, with_throttle
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples
-from airtruth.tracing.model.remainder import remainders
 from airtruth.tracing.model.settings import declared_derivatives_of
 from airtruth.units import DEG, G0
 

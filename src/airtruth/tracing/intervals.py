@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, ParameterEstimate]:
     """Value, standard deviation and 95 % interval of each parameter of an effect.
 
+    The relative uncertainty of the direction of a cause is one of its size too: all that it moves may be in proportion to another
+    size, such as the lift at a wing tip.
+
     Parameters
     ----------
     sizes, covariance : (parameters,) in the size coordinates of the effect, and their covariance.
@@ -28,6 +31,8 @@ def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, Para
     found = {}
     for i, p in enumerate(effect.parameters):
         size, std = float(sizes[i]), float(np.sqrt(max(covariance[i, i], 0.0)))
+        if i == 0 and effect.prior is not None:
+            std = math.hypot(std, effect.prior.shape * size)
         value = p.value(size)
         low, high = sorted((p.value(size - Z95 * std), p.value(size + Z95 * std)))
         slope = abs(p.value(size + 0.01 * std) - value) / 0.01 if math.isfinite(value) else math.inf

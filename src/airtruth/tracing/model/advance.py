@@ -24,7 +24,7 @@ from airtruth.tracing.model.by_motion import (
     rates,
     state_count,
 )
-from airtruth.tracing.model.equations import hold_plays
+from airtruth.tracing.model.effect_states import hold_plays
 from airtruth.tracing.model.gust_states import lead_decay
 from airtruth.tracing.model.kernel_input import AnyGrid, FilterModel
 from airtruth.tracing.model.linearise import delay_system

@@ -9,21 +9,20 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
-from airtruth.tracing.model.equation_slopes import AircraftMoves
 from airtruth.tracing.model.filter import innovations, path_of
 from airtruth.tracing.model.flight_slopes import innovation_slopes
 from airtruth.tracing.model.kernel_input import (
-    AircraftArrays,
-    AirInputs,
     EffectArrays,
     FilterModel,
     GustModel,
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralAirInputs
-from airtruth.tracing.model.lateral_slopes import LateralMoves
+from airtruth.tracing.model.lateral.input import LateralAircraft, LateralAirInputs
+from airtruth.tracing.model.lateral.slopes import LateralMoves
 from airtruth.tracing.model.linearise import FirstUpdate, linearise
+from airtruth.tracing.model.longitudinal.input import AircraftArrays, AirInputs
+from airtruth.tracing.model.longitudinal.slopes import AircraftMoves
 from airtruth.tracing.model.parameters import ParameterLayout, core_states, state_layout
 from airtruth.tracing.model.sensor_slopes import GainSlopes, Moved, width_of
 from airtruth.tracing.model.slopes import moving

@@ -157,7 +157,7 @@ def output_count(model: FilterModel) -> int:
 def rates(x: Array, at: AnyPoint, model: FilterModel, out: Array) -> float:
     """x' of the motion, the gusts and the effects' states into ``out``; returns the force of the late output at the CG [m/s2].
 
-    A play has no x': that of a lag in its place serves the linearisation, and `airtruth.tracing.model.equations.hold_plays`
+    A play has no x': that of a lag in its place serves the linearisation, and `airtruth.tracing.model.effect_states.hold_plays`
     and `move_plays` replace it.
     """
     raise NotImplementedError

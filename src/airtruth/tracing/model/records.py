@@ -160,7 +160,7 @@ class TraceRecord:
     plant : the declared aircraft there.
     gust_length_m : scale length of the gust that the filter estimates there [m].
     remainder : (coefficients, points) on the filter's grid, which the declared JSBSim model has along this record beyond the
-        plant's tables (`airtruth.tracing.model.remainder`), from the lead on; None for none.
+        plant's tables (`airtruth.tracing.model.longitudinal.remainder`), from the lead on; None for none.
     """
 
     signals: Signals

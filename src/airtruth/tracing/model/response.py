@@ -14,7 +14,6 @@ from airtruth.numerics.kept import Kept
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.tracing.model import filter as record_filter
-from airtruth.tracing.model import lateral_packing, longitudinal_packing
 from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
 from airtruth.tracing.model.compile import CompiledChange, compile_change
 from airtruth.tracing.model.kernel_input import (
@@ -25,6 +24,8 @@ from airtruth.tracing.model.kernel_input import (
     KernelInput,
     SensorArrays,
 )
+from airtruth.tracing.model.lateral.packing import PACKING as LATERAL_PACKING
+from airtruth.tracing.model.longitudinal.packing import PACKING as LONGITUDINAL_PACKING
 from airtruth.tracing.model.packing import AirPath, Packing
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
@@ -38,8 +39,8 @@ Array = NDArray[np.float64]
 LOST: Final = 1e9
 """Residual of a sample that a lost motion does not reach [unit of the output] (judgement: beyond any that counts)."""
 _PACKINGS: Final[dict[str, Packing]] = {
-    LONGITUDINAL.name: longitudinal_packing.PACKING,
-    LATERAL.name: lateral_packing.PACKING,
+    LONGITUDINAL.name: LONGITUDINAL_PACKING,
+    LATERAL.name: LATERAL_PACKING,
 }
 """Motion -> how its records are packed for the filter."""
 _MOST_SLOW: Final = 0.99

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.tracing.model.corners import Corners
-from airtruth.tracing.model.equation_slopes import AircraftMoves
-from airtruth.tracing.model.equations import PLAY
+from airtruth.tracing.model.effect_states import PLAY
 from airtruth.tracing.model.filter import initial_state, innovations, path_of
 from airtruth.tracing.model.flight_slopes import innovation_slopes
 from airtruth.tracing.model.gain_slopes import Conditions, Moves, conditions
 from airtruth.tracing.model.gains_along import slopes_along
 from airtruth.tracing.model.kernel_input import KernelInput
-from airtruth.tracing.model.lateral_slopes import LateralMoves
+from airtruth.tracing.model.lateral.slopes import LateralMoves
 from airtruth.tracing.model.linearise import FirstUpdate
+from airtruth.tracing.model.longitudinal.slopes import AircraftMoves
 from airtruth.tracing.model.parameters import ParameterLayout
 from airtruth.tracing.model.response import LOST, FilterInputs, Response, kernel_input, respond_to
 from airtruth.tracing.model.sensor_slopes import Moved, width_of

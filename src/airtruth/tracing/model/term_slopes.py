@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
-from airtruth.tracing.model.equations import PLAY, PLAY_S, shape, signal_of
+from airtruth.tracing.model.effect_states import PLAY, PLAY_S, shape, signal_of
 from airtruth.tracing.model.kernel_input import EffectArrays, FilterModel
 from airtruth.tracing.model.slopes import SlopeWork
 
@@ -140,7 +140,7 @@ def reading_slopes(
     out: Array,
     work: SlopeWork,
 ) -> None:
-    """Add the derivatives of the increments of the readings, see `airtruth.tracing.model.equations.add_readings`."""
+    """Add the derivatives of the increments of the readings, see `airtruth.tracing.model.effect_states.add_readings`."""
     effects = model.effects
     for t in range(effects.amplitude.size):
         output = effects.term_index[t, 0] - first

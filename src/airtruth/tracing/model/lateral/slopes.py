@@ -1,4 +1,4 @@
-"""Derivatives of the equations of `airtruth.tracing.model.lateral_equations` along those of the states, and in the parameters."""
+"""Derivatives of the equations of the lateral-directional motion along those of the states, and in the parameters."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.cells import cell
 from airtruth.numerics.compiled import inner
 from airtruth.physics.motion import LATERAL
 from airtruth.tracing.model.compile import CompiledChange
-from airtruth.tracing.model.equations import cell
 from airtruth.tracing.model.gust_slopes import gust_rate_slopes, gust_weights, slopes_of_gust
 from airtruth.tracing.model.gust_states import gust_of
 from airtruth.tracing.model.kernel_input import FilterModel
-from airtruth.tracing.model.lateral_equations import (
+from airtruth.tracing.model.lateral.equations import (
     BETA_DOT,
     COEFFICIENTS,
     LATE,
@@ -32,7 +32,7 @@ from airtruth.tracing.model.lateral_equations import (
     turning,
     with_beta_dot,
 )
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralPoint
+from airtruth.tracing.model.lateral.input import LateralAircraft, LateralPoint
 from airtruth.tracing.model.parameters import ParameterLayout
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.slopes import (
@@ -314,7 +314,7 @@ def lateral_output_slopes(
 def pack_lateral_moves(
     record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float
 ) -> LateralMoves:
-    """Derivatives of `airtruth.tracing.model.lateral_packing.pack_lateral` in the parameters."""
+    """Derivatives of `airtruth.tracing.model.lateral.packing.pack_lateral` in the parameters."""
     entries, plant = ParameterLayout(LATERAL).common, record.plant
     turned = np.zeros(len(LATERAL.derivatives))
     for row in (LATERAL.row(x.name) for x in LATERAL.coefficients if x.length is not None):

@@ -14,8 +14,8 @@ from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.tracing.model.by_motion import register
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.kernel_input import GustModel
-from airtruth.tracing.model.lateral_equations import EQUATIONS
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralAirInputs
+from airtruth.tracing.model.lateral.equations import EQUATIONS
+from airtruth.tracing.model.lateral.input import LateralAircraft, LateralAirInputs
 from airtruth.tracing.model.packing import AirPath, Packing, turned_increments
 from airtruth.tracing.model.parameters import CommonEntries
 from airtruth.tracing.model.plant import Plant

@@ -1,4 +1,4 @@
-"""Derivatives of the equations of `airtruth.tracing.model.equations` along those of the states, and in the parameters."""
+"""Derivatives of the equations of the pitch plane along those of the states, and in the parameters."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.cells import cell
 from airtruth.numerics.compiled import inner
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import SIGNALS
 from airtruth.tracing.model.compile import CompiledChange
-from airtruth.tracing.model.equations import (
+from airtruth.tracing.model.gust_slopes import gust_rate_slopes, gust_weights, slopes_of_gust
+from airtruth.tracing.model.kernel_input import FilterModel
+from airtruth.tracing.model.longitudinal.equations import (
     ALPHA_DOT,
     READING,
     AirSignals,
     air_alpha,
-    cell,
     effective_elevator,
     gust,
     half_time,
@@ -25,8 +27,7 @@ from airtruth.tracing.model.equations import (
     rates,
     terms,
 )
-from airtruth.tracing.model.gust_slopes import gust_rate_slopes, gust_weights, slopes_of_gust
-from airtruth.tracing.model.kernel_input import AircraftArrays, AirPoint, FilterModel
+from airtruth.tracing.model.longitudinal.input import AircraftArrays, AirPoint
 from airtruth.tracing.model.parameters import GUST_1, LEAD, OUTPUTS, SHORT_PERIOD
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.slopes import (
@@ -344,7 +345,7 @@ def longitudinal_output_slopes(
 
 
 def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
-    """Derivatives of `airtruth.tracing.model.longitudinal_packing.pack_aircraft` in the parameters."""
+    """Derivatives of `airtruth.tracing.model.longitudinal.packing.pack_aircraft` in the parameters."""
     entries, row = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
     plant = record.plant
     upward, lead = gust_weights(GUST_1, rolloff)

@@ -24,20 +24,22 @@ from typing import Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.numerics.cells import lower_point
+from airtruth.numerics.cells import cell
 from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensors import vane_equation
-from airtruth.physics.terms import numbered_shape
 from airtruth.tracing.model.by_motion import MotionEquations, register
-from airtruth.tracing.model.gust_states import gust_of, gust_rates
-from airtruth.tracing.model.kernel_input import (
-    AircraftArrays,
-    AirInputs,
-    AirPoint,
-    EffectArrays,
-    FilterModel,
+from airtruth.tracing.model.effect_states import (
+    add_readings,
+    effect_rates,
+    follow,
+    has_plays,
+    shape,
+    signal_of,
 )
+from airtruth.tracing.model.gust_states import gust_of, gust_rates
+from airtruth.tracing.model.kernel_input import EffectArrays, FilterModel
+from airtruth.tracing.model.longitudinal.input import AircraftArrays, AirInputs, AirPoint
 from airtruth.tracing.model.parameters import GUST_1, OUTPUTS
 from airtruth.units import G0
 
@@ -45,15 +47,9 @@ Array = NDArray[np.float64]
 
 READING: Final = len(LONGITUDINAL.coefficients)
 """First number of a reading among what a term acts on, see `EffectArrays`."""
-PLAY: Final = 2
-"""Number of the play in `airtruth.physics.terms.STATE_KINDS`."""
-PLAY_S: Final = 0.05
-"""Time constant of the lag that takes the place of a play in the linearisation [s] (judgement: a play follows a motion that is
-large against its width at once)."""
 ALPHA_DOT: Final = 3
 """Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
 
-shape = cast("Callable[[int, float], float]", inner(numbered_shape))
 _vane = cast("Callable[[float, float, float, float], float]", inner(vane_equation))
 
 
@@ -94,13 +90,6 @@ def effective_elevator(elevator_rad: float, aircraft: AircraftArrays) -> float:
 
 
 @inner
-def cell(axis: Array, x: float) -> tuple[int, float]:
-    """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
-    low = lower_point(axis, x)
-    return low, (x - axis[low]) / (axis[low + 1] - axis[low])
-
-
-@inner
 def _look_up(
     aircraft: AircraftArrays, alpha: float, surface: float, qhat: float, qbar: float
 ) -> tuple[float, float, float]:
@@ -124,12 +113,6 @@ def _look_up(
         fz * qbar + (1.0 - si) * constant[i, 1] + si * constant[i + 1, 1],
         fm * qbar + (1.0 - si) * constant[i, 2] + si * constant[i + 1, 2],
     )
-
-
-@inner
-def signal_of(signals: tuple[float, ...], number: int) -> float:
-    """A signal of any motion by its number."""
-    return signals[number]
 
 
 @inner
@@ -205,52 +188,6 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
 
 
 @inner
-def effect_rates(x: Array, signals: tuple[float, ...], model: FilterModel, out: Array) -> None:
-    """x' of the effects' states."""
-    effects = model.effects
-    for k in range(effects.time_s.size):
-        at = model.states.effect[k]
-        s = signal_of(signals, effects.state_index[k, 1])
-        if effects.state_index[k, 0] == PLAY:
-            out[at] = (s - x[at]) / PLAY_S
-        elif effects.state_index[k, 0] == 0:
-            out[at] = (s - x[at]) / effects.time_s[k]
-        else:
-            wn = 1.0 / effects.time_s[k]
-            out[at] = x[at + 1]
-            out[at + 1] = wn * wn * (s - x[at]) - 2.0 * effects.damping[k] * wn * x[at + 1]
-
-
-@inner
-def hold_plays(x: Array, tried: Array, model: FilterModel) -> None:
-    """Put the states of plays in ``tried`` back to those of ``x``: they do not move within a step."""
-    effects = model.effects
-    for k in range(effects.time_s.size):
-        if effects.state_index[k, 0] == PLAY:
-            tried[model.states.effect[k]] = x[model.states.effect[k]]
-
-
-@inner
-def has_plays(effects: EffectArrays) -> bool:
-    """Whether an effect has a play."""
-    found = False
-    for k in range(effects.time_s.size):
-        found = found or effects.state_index[k, 0] == PLAY
-    return found
-
-
-@inner
-def follow(x: Array, signals: tuple[float, ...], model: FilterModel) -> None:
-    """Move the states of plays to no more than their half width from their signals."""
-    effects = model.effects
-    for k in range(effects.time_s.size):
-        if effects.state_index[k, 0] == PLAY:
-            s = signal_of(signals, effects.state_index[k, 1])
-            i, half = model.states.effect[k], effects.half_width[k]
-            x[i] = min(max(x[i], s - half), s + half)
-
-
-@inner
 def half_time(at: AirPoint, model: FilterModel) -> float:
     """c/(2V) [s]."""
     return float(0.5 * model.aircraft.chord_m / at.airspeed_m_s)
@@ -295,23 +232,6 @@ def air_at(grid: AirInputs[Array], point: int) -> AirPoint:
         grid.lift[point],
         grid.moment[point],
     )
-
-
-@inner
-def add_readings(x: Array, signals: tuple[float, ...], first: int, model: FilterModel, y: Array) -> None:
-    """Add the increments of the readings; ``first``: first number of a reading among what a term acts on."""
-    effects = model.effects
-    for t in range(effects.amplitude.size):
-        output = effects.term_index[t, 0] - first
-        if output >= 0:
-            state = effects.term_index[t, 3]
-            s = x[state] if state >= 0 else signal_of(signals, effects.term_index[t, 1])
-            more = effects.amplitude[t] * shape(effects.term_index[t, 2], s - effects.origin[t])
-            behind = effects.term_index[t, 5]
-            if behind >= 0:
-                driver = signal_of(signals, effects.state_index[behind, 1])
-                more *= x[model.states.effect[behind]] - driver
-            y[output] += more
 
 
 @inner
@@ -376,25 +296,15 @@ register(
 
 __all__ = [
     "ALPHA_DOT",
-    "PLAY",
-    "PLAY_S",
     "READING",
     "AirSignals",
-    "add_readings",
     "air_alpha",
     "air_at",
-    "cell",
-    "effect_rates",
     "effective_elevator",
-    "follow",
     "gust",
     "half_time",
-    "has_plays",
-    "hold_plays",
     "measured",
     "rates",
     "settle_effects",
-    "shape",
-    "signal_of",
     "terms",
 ]

@@ -32,13 +32,13 @@ from typing import Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.cells import cell
 from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.sensors import side_vane_equation
 from airtruth.tracing.model.by_motion import MotionEquations
-from airtruth.tracing.model.equations import (
+from airtruth.tracing.model.effect_states import (
     add_readings,
-    cell,
     effect_rates,
     follow,
     has_plays,
@@ -47,7 +47,7 @@ from airtruth.tracing.model.equations import (
 )
 from airtruth.tracing.model.gust_states import gust_of, gust_rates
 from airtruth.tracing.model.kernel_input import EffectArrays, FilterModel
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralAirInputs, LateralPoint
+from airtruth.tracing.model.lateral.input import LateralAircraft, LateralAirInputs, LateralPoint
 from airtruth.tracing.model.parameters import core_of
 from airtruth.units import G0
 

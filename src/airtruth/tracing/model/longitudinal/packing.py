@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.tracing.model.compile import CompiledChange
-from airtruth.tracing.model.kernel_input import AircraftArrays, AirInputs
+from airtruth.tracing.model.longitudinal.input import AircraftArrays, AirInputs
 from airtruth.tracing.model.packing import Packing, turned_increments
 from airtruth.tracing.model.parameters import SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.plant import Plant

@@ -1,0 +1,1 @@
+"""The lateral-directional motion in the filter: inputs, equations, their derivatives, and forces beyond the tables."""

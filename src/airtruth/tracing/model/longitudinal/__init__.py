@@ -1,0 +1,1 @@
+"""The pitch plane in the filter: inputs, equations, their derivatives, and forces beyond the tables."""
