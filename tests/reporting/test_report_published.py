@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import report_samples
 
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.reporting import statistics
 from airtruth.reporting.paper import published
 
 PAPER = published.load()
@@ -27,7 +27,7 @@ def name(case):
 def recomputed_pct(column, parameters):
     mean = np.array([column.mean[p].value for p in parameters])
     truth = np.array([PAPER.truth[p].value for p in parameters])
-    return 100.0 * statistics.relative_error((mean - truth)[None, :], truth).value
+    return 100.0 * report_samples.relative_error((mean - truth)[None, :], truth).value
 
 
 def bounds_pct(column, parameters):

@@ -103,12 +103,6 @@ class MethodStatistics:
     products: Mapping[str, float]
 
 
-def mean(x: Array) -> Statistic:
-    """Return the mean over the rows; its standard error is s/sqrt(n)."""
-    n, total = len(x), np.sum(x, axis=0)
-    return mean_of(n, total, np.sum((x - total / max(n, 1)) ** 2, axis=0))
-
-
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def mean_of(n: Array | int, total: Array, squares: Array) -> Statistic:
     """Return the mean from sums.
@@ -121,13 +115,6 @@ def mean_of(n: Array | int, total: Array, squares: Array) -> Statistic:
     """
     rows = np.asarray(n, dtype=np.float64)
     return Statistic(total / rows, np.sqrt(squares / (rows - 1.0)) / np.sqrt(rows))
-
-
-def standard_deviation(x: Array) -> Statistic:
-    """Return the standard deviation (n - 1) over the rows, see `standard_deviation_of`."""
-    n = len(x)
-    d = x - np.sum(x, axis=0) / max(n, 1)
-    return standard_deviation_of(n, np.sum(d**2, axis=0), np.sum(d**4, axis=0))
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
@@ -151,20 +138,10 @@ def standard_deviation_of(n: Array | int, s2: Array, s4: Array) -> Statistic:
     return Statistic(s, np.where(n > 3, np.sqrt(variance) / (2.0 * np.where(s > 0.0, s, np.inf)), np.nan))
 
 
-def rms(errors: Array) -> Statistic:
-    """Return the root mean square over the rows, see `root_of`."""
-    return root_of(mean(errors**2))
-
-
 def root_of(square: Statistic) -> Statistic:
     """Return the root of a mean square; its standard error follows from that of the mean square (delta method)."""
     value = np.sqrt(square.value)
     return Statistic(value, square.se / (2.0 * np.where(value > 0.0, value, np.inf)))
-
-
-def hit_rate(hits: Array) -> Statistic:
-    """Return the fraction of rows that are 1 and not 0, see `hit_rate_of`."""
-    return hit_rate_of(len(hits), np.sum(hits, axis=0))
 
 
 @np.errstate(invalid="ignore", divide="ignore")
@@ -182,20 +159,6 @@ def hit_rate_of(n: Array | int, hits: Array) -> Statistic:
     n = np.asarray(n, dtype=np.float64)
     p = (hits + 2.0) / (n + 4.0)
     return Statistic(hits / n, np.where(n > 0, np.sqrt(p * (1.0 - p) / (n + 4.0)), np.nan))
-
-
-def relative_error(errors: Array, truth: Array) -> RelativeError:
-    """Return RelErr, the norm of the mean error over the norm of the truth.
-
-    Parameters
-    ----------
-    errors : (n, k) estimate - truth of each run.
-    truth : (k,) truth; its mean over the runs where it differs between runs.
-    """
-    n = len(errors)
-    bias = np.sum(errors, axis=0) / max(n, 1)
-    own = influence(errors, bias, truth, n)
-    return relative_error_of(n, bias, truth, float(np.sum(own**2)), float(np.sum((errors - bias) ** 2)))
 
 
 def relative_error_of(n: int, bias: Array, truth: Array, product: float, squares: float) -> RelativeError:
