@@ -115,6 +115,10 @@ def test_the_updated_aircraft_of_no_effect_is_beside_the_refitted_derivatives(an
         ({"verdict": "none", "effects": ()}, " for a missing effect; "),
         ({"verdict": "none", "effects": ()}, " for the declared model); they show no missing effect."),
         ({"verdict": "unexplained", "effects": ()}, "Unexplained: the declared aircraft lacks something"),
+        (
+            {"verdict": "unexplained", "effects": (), "remaining": Evidence(12.0, 3e-3, "the derivatives")},
+            "lacks something (p = 0.003",
+        ),
         ({"verdict": "one_of"}, "One of several: the declared aircraft lacks elevator_delay, or an effect"),
         (
             {"provisional": True, "remaining": Evidence(50.0, 1e-4, "q")},

@@ -73,7 +73,7 @@ def evidence(test: Relation, row: int = -1) -> str:
         side = LATERAL.outputs[-1].channel
         return (
             f"{side} changes by {-f[0]:.2g} +- {f[1]:.2g} g per radian of {LATERAL.vane}, where sideslip from the right pushes "
-            f"to the left, usually by about {f[2]:.2g} g"
+            f"to the left, usually by about {f[2]:.2g} g, unless the accelerometer is far ahead of the CG"
         )
     if test.name in TURNS:
         return (

@@ -81,7 +81,7 @@ def _conclusion(answer: TraceAnswer) -> str:
         )
     if answer.verdict == "unexplained":
         return (
-            f"Unexplained: the declared aircraft lacks something ({_evidence(answer.anomaly)}), and no candidate "
+            f"Unexplained: the declared aircraft lacks something ({_evidence(answer.remaining)}), and no candidate "
             "passes every acceptance test."
         )
     alike = _alike(answer)
