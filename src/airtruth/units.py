@@ -17,6 +17,8 @@ INCH: Final = 0.0254
 """International inch [m], exact (NIST SP 811)."""
 KT: Final = 1852.0 / 3600.0
 """International knot [m/s], exact (NIST SP 811)."""
+MPH: Final = 0.44704
+"""Mile per hour [m/s], exact (NIST SP 811)."""
 LB: Final = 0.45359237
 """Avoirdupois pound [kg], exact (NIST SP 811)."""
 G0: Final = 9.80665
@@ -36,9 +38,9 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "angle": {"rad": 1.0, "deg": DEG, "cdeg": 0.01 * DEG, "mrad": 1e-3},
     "angular_rate": {"rad_s": 1.0, "deg_s": DEG, "cdeg_s": 0.01 * DEG, "mrad_s": 1e-3},
     "angular_acceleration": {"rad_s2": 1.0, "deg_s2": DEG},
-    "speed": {"m_s": 1.0, "kt": KT, "ft_s": FT, "km_h": 1.0 / 3.6, "cm_s": 0.01, "mm_s": 1e-3},
+    "speed": {"m_s": 1.0, "kt": KT, "ft_s": FT, "km_h": 1.0 / 3.6, "mph": MPH, "cm_s": 0.01, "mm_s": 1e-3},
     "acceleration": {"m_s2": 1.0, "g": G0, "ft_s2": FT, "mg": 1e-3 * G0, "cm_s2": 0.01},
-    "length": {"m": 1.0, "ft": FT, "in": INCH, "mm": 1e-3, "cm": 0.01, "km": 1e3},
+    "length": {"m": 1.0, "ft": FT, "in": INCH, "mm": 1e-3, "cm": 0.01, "km": 1e3, "fl": 100.0 * FT},
     "area": {"m2": 1.0, "ft2": FT**2},
     "time": {"s": 1.0, "ms": 1e-3},
     "frequency": {"hz": 1.0},
@@ -61,7 +63,7 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "ratio": {"": 1.0, "pct": 0.01},
     "per_angle": {"per_rad": 1.0, "per_deg": 1.0 / DEG},
 }
-"""Dimension -> suffix of a unit -> factor to SI; "cdeg" is 1/100 deg."""
+"""Dimension -> suffix of a unit -> factor to SI; "cdeg" is 1/100 deg, "fl" a flight level."""
 ZEROS: Final[dict[str, float]] = {"degc": 273.15, "degf": 459.67}
 """Unit whose zero is not that of SI -> its value at the zero of SI, with the opposite sign (NIST SP 811, B.8)."""
 

@@ -191,3 +191,16 @@ def test_pitching_by_sideslip_is_no_fault_of_the_elevator(tmp_path):
     assert not run.fly(planned, tmp_path / "out").failures
     (file,) = log_files(tmp_path / "out")
     assert not inspect(read_log(file), planned.aircraft)
+
+
+@pytest.mark.parametrize("surfaces", [("rudder",), ("aileron",), ("aileron", "rudder")])
+def test_a_surface_whose_command_is_reversed_with_it_has_the_opposite_sign(log, surfaces):
+    """A recorder with the other sense writes surface and command alike, so that one agrees with the other."""
+    channels = dict(log.channels)
+    for name in ("aileron", "rudder"):
+        sign = -1.0 if name in surfaces else 1.0
+        surface = channels[f"{name}_rad"]
+        early = np.concatenate([surface[2:], surface[-2:]])  # 40 ms ahead
+        channels |= {f"{name}_rad": sign * surface, f"{name}_command_rad": sign * early}
+    found = {(f.channel, f.code) for f in certain(inspect(replace(log, channels=channels)))}
+    assert found == {(f"{name}{kind}_rad", "sign") for name in surfaces for kind in ("", "_command")}

@@ -10,7 +10,7 @@ from airtruth.errors import AircraftError, LogError
 from airtruth.physics.lateral import lateral_scale, lateral_system
 from airtruth.physics.motion import LATERAL
 from airtruth.quantity import Quantity
-from airtruth.simulation.probe_lateral import lateral_forces
+from airtruth.simulation.probe_lateral import lateral_forces, pitch_forces
 from airtruth.tracing.model.declared import UNCERTAINTY, declared_covariance
 from airtruth.tracing.model.plant import ForceTable, linear, looked_up
 from airtruth.tracing.model.probed import probed_lateral, trim_of
@@ -110,6 +110,18 @@ def test_rudder_and_aileron_lose_force_with_sideslip_and_no_other_pair_counts(pl
             flown, tables, _ = compared(plant, alpha, own)
             found = (np.abs(flown - tables).max(axis=0) / whole).max()
             assert found > 1e-3 if (first, second) in ((0, 3), (0, 4)) else found < 1e-3
+
+
+def test_ailerons_pitch_the_gtm():
+    """-66 +- 1.3 1/s2 for the square of the aileron, by least squares on q' of six flights in calm air (combined.toml)."""
+    at = trim_of(GTM, SPEED, DENSITY, ALTITUDE, 0.0, LATERAL)
+    signals = np.tile(at.origin(LATERAL), (3, 1))
+    signals[1:, LATERAL.column("aileron")] += np.array([3.5, -3.5]) * DEG
+    forces = pitch_forces(GTM, at, np.full(3, at.alpha_rad), signals)
+    assert np.abs(forces[0]).max() < 1e-9
+    assert forces[1:, 1].mean() / GTM.constants.inertia_yy_kg_m2 == pytest.approx(
+        -66.0 * (3.5 * DEG) ** 2, rel=0.2
+    )
 
 
 def test_slopes_of_the_tables_at_the_trim_are_the_derivatives(plant):

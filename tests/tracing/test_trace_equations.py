@@ -130,13 +130,19 @@ def of_kernel(x, at, model, out):
     return rates(x, at, model, out)
 
 
-def rates_at(change, x=(0.04, 0.3), de=0.05, common=None):
+def rates_at(change, x=(0.04, 0.3), de=0.05, common=None, coupling=(0.0, 0.0)):
     model = tr.model(change, common)
     state = np.zeros(model.states.size)
     state[:2] = x
     out = np.zeros(state.size)
-    at = AirPoint(de, tr.V, tr.V, 0.5 * tr.DENSITY * tr.V**2, 0.04, 0.0, 0.0)
+    at = AirPoint(de, tr.V, tr.V, 0.5 * tr.DENSITY * tr.V**2, 0.04, *coupling, 0.0, 0.0)
     return out, of_kernel(state, at, model, out)
+
+
+def test_what_roll_yaw_and_bank_add_to_the_rates_leaves_the_force():
+    (plain, az), (coupled, same) = rates_at(Change()), rates_at(Change(), coupling=(-0.02, 0.3))
+    assert coupled[:2] - plain[:2] == pytest.approx([-0.02, 0.3], rel=1e-12)
+    assert same == az
 
 
 VALUES = {"alpha": 0.04, "elevator": 0.05, "qhat": 0.3 * tr.HALF}
@@ -228,7 +234,7 @@ def test_spectrum_of_the_gust(rolloff, tolerance):
     length, v = 840.419, tr.V
     model = tr.model(None, common, per_record)
     model = model._replace(gusts=model.gusts._replace(length_m=length))
-    at = AirPoint(0.0, v, v, 1.0, 0.0, 0.0, 0.0)
+    at = AirPoint(0.0, v, v, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     rate = v / length
     a = np.zeros((8, 8))
     a[2, 2], a[3, 2], a[3, 3] = -rate, rate, -rate

@@ -29,7 +29,7 @@ def linearised(lags=None, sigma_w=0.3, delays=None, colour=WHITE):
     states = state_layout(model.states.effect, model.states.motion, lags, delays, bool(colour[:3].any()))
     model = model._replace(sensors=sensors, states=states)
     a, c = np.empty((states.size, states.size)), np.empty((3, states.size))
-    at = AirPoint(0.0, tr.V, tr.V, 0.5 * tr.DENSITY * tr.V**2, 0.0, 0.0, 0.0)
+    at = AirPoint(0.0, tr.V, tr.V, 0.5 * tr.DENSITY * tr.V**2, 0.0, 0.0, 0.0, 0.0, 0.0)
     linearise(np.zeros(states.size), at, model, a, c)
     return a, c, model
 

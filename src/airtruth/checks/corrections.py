@@ -178,9 +178,10 @@ _SENSES: Final = (
     ("psi_rad", _R),
     (_BETA, _AY),
     *((c.channel, c.command) for c in MOTION.controls),
+    tuple(n for c in MOTION.controls for n in (c.channel, c.command)),
 )
 """Groups of channels whose positive sense a recorder may have the other way round: pitch axis, elevator, specific force, roll,
-yaw, side, aileron, rudder."""
+yaw, side, aileron, rudder, and both of these."""
 _SURFACES: Final = tuple(n for m in MOTIONS.values() for n in (*m.surfaces, *m.commands))
 """Control surfaces and their commands."""
 
@@ -202,7 +203,7 @@ def _shared(names: tuple[str, ...], single: Sequence[Correction]) -> Iterator[Co
         by_mistake: dict[str, dict[str, Correction]] = {}
         for one in single:
             if one.code == code and one.penalty <= 1.0:
-                by_mistake.setdefault(one.mistake, {})[one.channels[0]] = one
+                by_mistake.setdefault(code if code == "sign" else one.mistake, {})[one.channels[0]] = one
         for group in tried:
             for of_channel in by_mistake.values():
                 parts = tuple(of_channel[n] for n in group if n in of_channel)
@@ -229,7 +230,7 @@ def _together(parts: tuple[Correction, ...]) -> Correction:
     return Correction(
         tuple(c.channels[0] for c in parts),
         parts[0].code,
-        parts[0].mistake,
+        min((c.mistake for c in parts), key=len),
         "; ".join(c.cure for c in parts),
         lambda c, dt_s: {name: values for part in parts for name, values in part.apply(c, dt_s).items()},
         0.5 * len(parts),

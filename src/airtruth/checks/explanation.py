@@ -145,13 +145,15 @@ def _trials(
 ) -> list[Trial]:
     """Every correction that may be made beside those that were made already.
 
-    Of a record in all axes those with a channel that no failed test has are left out: they are many.
+    Of a record in all axes those with a channel that no failed test has are left out: they are many. A sense that channels share
+    is tried if one of them fails: a command that is reversed with its surface agrees with it.
     """
     found = []
     failing = {n for t in results if np.max(t.distance) > PASSED for n in t.channels}
     everything = not turned(runs)
     for correction in catalogue(runs, stated):
-        if not everything and not failing.issuperset(correction.channels):
+        shares_sense = correction.code == "sign" and not failing.isdisjoint(correction.channels)
+        if not everything and not shares_sense and not failing.issuperset(correction.channels):
             continue
         if any(_excludes(one, correction) for one in made):
             continue

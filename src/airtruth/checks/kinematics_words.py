@@ -45,7 +45,7 @@ def conclusions(
 ) -> list[str]:
     """Conclusions in words, the most important first."""
     result = _headline(verdict, found, findings, causes)
-    if verdict != "agrees" and found.enlargement > 1.0:
+    if verdict != "agrees" and found.enlargement > 1.0 and found.p_value <= AGREES:
         result.append(
             f"The errors do not explain all motion that follows {found.problem.kinematics.controls} "
             f"(p = {found.p_value:.1g}), so the sensor noise is "

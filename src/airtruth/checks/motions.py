@@ -74,18 +74,32 @@ def chosen(logs: Sequence[FlightLog], wanted: str | None) -> tuple[Motion, ...]:
     LogError
         If the wanted motion is unknown, or a log lacks its channels.
     """
-    if wanted is None:
-        return supported(logs) or (LONGITUDINAL,)
-    if wanted not in MOTIONS:
+    if wanted is None and (found := supported(logs)):
+        return found
+    if wanted is not None and wanted not in MOTIONS:
         raise LogError(f"motion {wanted!r}: unknown; {choices(wanted, MOTIONS)}")
-    motion = MOTIONS[wanted]
+    motion = LONGITUDINAL if wanted is None else MOTIONS[wanted]
     for log in logs:
-        missing = missing_channels(log, motion)
-        if missing and motion is not LONGITUDINAL:  # whose own messages say more
-            raise LogError(
-                f"the {wanted} motion needs {', '.join(missing)}, which the log lacks; map it on import"
-            )
+        require(log, motion)
     return (motion,)
+
+
+def require(log: FlightLog, motion: Motion, source: str = "flight log") -> None:
+    """Refuse a log without the channels of a motion.
+
+    Parameters
+    ----------
+    source : name of the log in the message, usually its file.
+
+    Raises
+    ------
+    LogError
+        Naming the channels.
+    """
+    if lacking := missing_channels(log, motion):
+        raise LogError(
+            f"{source}: the {motion.name} motion needs {', '.join(lacking)}, which the log lacks; map it on import"
+        )
 
 
 def check_motions(
@@ -155,4 +169,4 @@ def _untold(logs: Sequence[FlightLog], reason: str) -> CheckResult:
     )
 
 
-__all__ = ["check_motions", "chosen", "missing_channels", "supported", "unsupported"]
+__all__ = ["check_motions", "chosen", "missing_channels", "require", "supported", "unsupported"]

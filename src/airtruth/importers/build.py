@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from airtruth.channels import SIGNALS
 from airtruth.checks.stated import KEY as STATED
+from airtruth.importers.clock import with_increasing_times
 from airtruth.importers.derived import with_air_data, with_alpha
 from airtruth.importers.held import without_repeats
 from airtruth.importers.mapping import Resample
 from airtruth.importers.merge import Merged
 from airtruth.importers.runs import require_rows, runs_of
-from airtruth.importers.uniform import beyond, jitter_of, shortened, slower, uniform
+from airtruth.importers.uniform import beyond, jitter_of, lost_of, shortened, slower, uniform
 from airtruth.logs.flight_log import RECORD_CONSTANTS, RESAMPLED, FlightLog
 from airtruth.logs.validate import JITTER
 from airtruth.physics.motion import LONGITUDINAL
@@ -40,13 +41,21 @@ def built(merged: Merged) -> FlightLog:
     """
     source, mapping = merged.pieces[0].source, merged.pieces[0].mapping
     ids, times, blocks, facts, drifts, lost, slow, jitter = [], [], [], {}, [], [], [], 0.0
+    missing, repeated = (0, 0.0), list[str]()
     held: dict[str, float] = {}
     for run_id, start, end, rows in runs_of(source, mapping, merged.series, merged.pieces[0].parts):
         where = f"{source.path}, run {run_id!r}"
         if rows is not None:
             require_rows(where, merged.series, len(rows))
         cut = {name: one.between(start, end, rows) for name, one in merged.series.items()}
+        if rows is not None:
+            increasing, notes, parts = with_increasing_times(cut)
+            if not parts.several:  # a run whose clock starts again is refused
+                cut, repeated = increasing, [*repeated, *(f"run {run_id!r}: {note}" for note in notes)]
         jitter = max([jitter, *(jitter_of(one) for one in cut.values())])
+        if merged.resample is not None and merged.resample.method != "previous":
+            number, longest = max(lost_of(one) for one in cut.values())
+            missing = (missing[0] + number, max(missing[1], longest))
         cut, rates = without_repeats(cut, merged.resample)
         held |= {name: min(hz, held.get(name, hz)) for name, hz in rates.items()}
         t, values = uniform(where, cut, merged.resample)
@@ -68,11 +77,11 @@ def built(merged: Merged) -> FlightLog:
     if facts:
         metadata[RECORD_CONSTANTS] = facts
     if merged.resample:
-        metadata[RESAMPLED] = _resampled(merged.resample, slow, jitter)
+        metadata[RESAMPLED] = _resampled(merged.resample, slow, jitter, missing)
     elif held:
         own_hz = (len(times[0]) - 1) / float(times[0][-1] - times[0][0])
         metadata[RESAMPLED] = _resampled(Resample(rate_hz=float(f"{own_hz:.6g}"), method="linear"), [held])
-    reading = [*merged.reading, *(f"{name}: {_HELD.format(hz)}" for name, hz in held.items())]
+    reading = [*merged.reading, *repeated, *(f"{name}: {_HELD.format(hz)}" for name, hz in held.items())]
     if reading:
         metadata[_READ] = reading
     if lost:
@@ -96,14 +105,19 @@ _HELD: Final = (
 
 
 def _resampled(
-    resample: Resample, slow: Sequence[Mapping[str, float]], jitter: float = 0.0
+    resample: Resample,
+    slow: Sequence[Mapping[str, float]],
+    jitter: float = 0.0,
+    missing: tuple[int, float] = (0, 0.0),
 ) -> dict[str, object]:
-    """The common rate, the method, the largest jitter, and the least rate of each channel that has fewer samples of its own."""
+    """The common rate, the method, the largest jitter, the samples that are missing with the longest time between two of them,
+    and the least rate of each channel that has fewer samples of its own."""
     own_hz: dict[str, float] = {}
     for one in slow:
         own_hz |= {name: min(hz, own_hz.get(name, hz)) for name, hz in one.items()}
     stated: dict[str, object] = {"rate_hz": resample.rate_hz, "method": resample.method}
     stated |= {"jitter": float(f"{jitter:.2g}")} if jitter > JITTER else {}
+    stated |= {"missing": missing[0], "longest_s": float(f"{missing[1]:.3g}")} if missing[0] else {}
     return stated | ({"from_hz": own_hz} if own_hz else {})
 
 
@@ -124,6 +138,11 @@ def sentences(log: FlightLog) -> list[str]:
         listed.append(
             f"the steps of the times differ by up to {100.0 * float(how['jitter']):.2g} %: channels are resampled to "
             f"{float(how['rate_hz']):g} Hz by {_METHODS[str(how['method'])]}"
+        )
+    if isinstance(how, Mapping) and "missing" in how:
+        listed.append(
+            f"{int(how['missing'])} samples are missing, and up to {float(how['longest_s']):g} s lie between two: they are "
+            f"by {_METHODS[str(how['method'])]}; cut a [[manoeuvre]] beside them if the surfaces move"
         )
     return listed
 

@@ -15,7 +15,14 @@ from airtruth.errors import AirtruthError, LogError
 from airtruth.importers.convert import convert
 from airtruth.importers.dictionary import Lexicon, Words, compact, lexicon
 from airtruth.importers.guessing.assignment import CERTAIN, AssignmentSearch, Decision
-from airtruth.importers.guessing.candidates import CommonTimes, candidates, rising, times_of
+from airtruth.importers.guessing.candidates import (
+    CommonTimes,
+    candidates,
+    pauses_of,
+    rising,
+    times_of,
+    without_pauses,
+)
 from airtruth.importers.guessing.columns import Column, GroupClock, clocks_of, columns_of, split
 from airtruth.importers.guessing.lateral import LATERAL_RELATIONS
 from airtruth.importers.guessing.proposal import Proposal, Writer
@@ -155,6 +162,8 @@ def _grid(columns: Sequence[Column], clocks: Mapping[str, GroupClock]) -> Common
     if not usable:
         rows = max((len(c.values) for c in columns), default=4)
         return CommonTimes(np.arange(float(rows)), 0.0)
+    pauses = pauses_of(np.unique(np.concatenate(usable)))
+    usable = [without_pauses(t, pauses) for t in usable]
     start, end = float(np.median([t.min() for t in usable])), float(np.median([t.max() for t in usable]))
     fastest = max(len(t) / float(np.ptp(t)) for t in usable)
     rate = float(np.clip(fastest, least, most))
@@ -162,7 +171,7 @@ def _grid(columns: Sequence[Column], clocks: Mapping[str, GroupClock]) -> Common
         middle = 0.5 * (start + end)
         start, end = middle - 0.5 * samples / rate, middle + 0.5 * samples / rate
     count = max(8, int((end - start) * rate))
-    return CommonTimes(start + np.arange(count) / rate, 1.0 / rate)
+    return CommonTimes(start + np.arange(count) / rate, 1.0 / rate, pauses)
 
 
 def _source_table(section: SourceSection) -> Iterator[str]:

@@ -20,6 +20,11 @@ from airtruth.isolation.protocol import IsolatedError, Task
 Array = NDArray[np.float64]
 _UNIT: Final = re.compile(r"[\[(][^\[\]()]*[\])]\s*$")
 """Unit in brackets at the end of a name."""
+_UNREAD: Final = {
+    **dict.fromkeys((".zip", ".gz", ".7z", ".tar"), "unpack it, and import a file in it"),
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), "export the table as CSV, and import that file"),
+}
+"""Suffix of a file that no reader reads -> the next step."""
 
 
 def open_source(path: Path | str, section: SourceSection | None = None) -> Source:
@@ -36,9 +41,10 @@ def open_source(path: Path | str, section: SourceSection | None = None) -> Sourc
     section = section or SourceSection()
     name = section.format or SUFFIXES.get(path.suffix.lower())
     if name is None:
-        raise ConfigurationError(
-            f"{path}: suffix {path.suffix!r} names no format; state [source] format, one of {', '.join(FORMATS)}"
-        )
+        cure = _UNREAD.get(path.suffix.lower(), f"state [source] format, one of {', '.join(FORMATS)}")
+        if path.is_dir():
+            raise ConfigurationError(f"{path}: a folder is no log; name a file in it")
+        raise ConfigurationError(f"{path}: suffix {path.suffix!r} names no format; {cure}")
     if not path.is_file():
         raise StoreError(f"{path}: no such file")
     if path.stat().st_size == 0:

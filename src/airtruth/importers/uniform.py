@@ -155,6 +155,16 @@ def jitter_of(one: Series) -> float:
     return largest if largest > 2.0 * rounding else 0.0
 
 
+def lost_of(one: Series) -> tuple[int, float]:
+    """Number of samples that are missing between others, and the longest time between two samples [s]; 0 and 0 for none."""
+    steps = np.diff(one.t_s[np.isfinite(one.t_s)]) if not one.constant else np.empty(0)
+    if len(steps) < 2 or not (steps > 0.0).all():
+        return 0, 0.0
+    usual = float(np.median(steps))
+    long = steps[steps >= 1.5 * usual]
+    return int((np.round(long / usual) - 1.0).sum()), float(long.max(initial=0.0))
+
+
 def _phase(full: Mapping[str, Series], start: float, end: float, rate_hz: float) -> float:
     """Start of the new times: a sample of a channel that has the new rate already, which is then not interpolated."""
     for one in full.values():
@@ -310,6 +320,7 @@ __all__ = [
     "even_times",
     "gaps",
     "jitter_of",
+    "lost_of",
     "low_passed",
     "resampled",
     "shortened",

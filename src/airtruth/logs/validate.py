@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airtruth.channels import SIGNALS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 
 Index = NDArray[np.int64]
 
@@ -103,13 +103,15 @@ def row_problems(log: FlightLog) -> Iterator[str]:
 
 
 def _missing(log: FlightLog) -> Iterator[str]:
+    """Channels that the motion lacks of whose channels the log holds the most, the pitch plane if both lack as many."""
+    motion = min(MOTIONS.values(), key=lambda m: len({*m.required} - {*log.channels}))
     present = [name for name in log.channels if name not in SIGNALS]
-    for name in LONGITUDINAL.required:
+    for name in motion.required:
         if name not in log.channels:
             near = difflib.get_close_matches(name, present, n=1, cutoff=0.5)
             step = f"the nearest column is {near[0]!r}: map it" if near else "map a column to it"
             if not near:
-                controls = [one.channel for one in LONGITUDINAL.controls]
+                controls = [one.channel for one in motion.controls]
                 step += _NO_VANE if name == LONGITUDINAL.vane else _SERVO if name in controls else ""
             yield f"{name}: required channel is missing ({SIGNALS[name].description}); {step} on import"
     if "density_kg_m3" not in log.channels and "altitude_m" not in log.channels:

@@ -10,7 +10,7 @@ products of two signals that the sum lacks are those that `airtruth.tracing.mode
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -28,8 +28,12 @@ Array = NDArray[np.float64]
 
 FORCES: Final = ("forces/fby-total-lbs", "moments/l-total-lbsft", "moments/n-total-lbsft")
 """Side force [lbf], rolling and yawing moment about the CG [lbf ft], without gravity."""
-_UNITS: Final = np.array([LBF, LBF * FT, LBF * FT])
-"""Factors of `FORCES` to N and N m."""
+FRAMES: Final = 50
+"""Frames of JSBSim for which filters and engines settle in one state [-] (`airtruth.simulation.probe`)."""
+_PITCH_FORCES: Final = ("forces/fbz-total-lbs", "moments/m-total-lbsft")
+"""Force along body z [lbf] and pitching moment about the CG [lbf ft], without gravity."""
+_UNITS: Final = {"forces": LBF, "moments": LBF * FT}
+"""Kind of a property -> factor to N or N m."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +53,16 @@ class LateralTables:
 
 
 class LateralStates:
-    """Forces and moments in states off a trim in six axes."""
+    """Forces and moments in states off a trim in six axes; ``forces``: their properties."""
 
-    def __init__(self, aircraft: Aircraft, trim: Trim, dt_s: float = 1.0 / 200.0) -> None:
+    def __init__(
+        self, aircraft: Aircraft, trim: Trim, dt_s: float = 1.0 / 200.0, forces: Sequence[str] = FORCES
+    ) -> None:
         self.trim = trim
         executive = Executive(aircraft, dt_s)
         self.model = executive.model
-        self._forces = executive.nodes(FORCES)
+        self._forces = executive.nodes(forces)
+        self._units = np.array([_UNITS[name.partition("/")[0]] for name in forces])
         self._states = HeldStates(executive, trim)
 
     @property
@@ -64,7 +71,8 @@ class LateralStates:
         return self.trim.origin(LATERAL)
 
     def at(self, attack_rad: float, signals: Array, ratio: float = 1.0) -> Array:
-        """(3,) Y [N], L and N [N m] with the surfaces where they are wanted, or at the end of their range.
+        """(forces,) Y [N], L and N [N m] unless others were asked for; the surfaces are where they are wanted, or at the end of
+        their range.
 
         Parameters
         ----------
@@ -78,7 +86,7 @@ class LateralStates:
         commands = {n: held.command(n) + x - self.trim.surfaces_rad[n] for n, x in wanted.items()}
         controls = held.moved(commands, **motion, **{LONGITUDINAL.vane: attack_rad})
         with_surfaces(lambda moved: self._states.respond(condition, moved), controls, wanted)
-        return np.asarray(np.array([node.get_double_value() for node in self._forces]) * _UNITS)
+        return np.asarray(np.array([node.get_double_value() for node in self._forces]) * self._units)
 
 
 def probe_lateral(aircraft: Aircraft, trim: Trim, grid: ForceGrid) -> LateralTables:
@@ -122,6 +130,22 @@ def lateral_forces(aircraft: Aircraft, trim: Trim, attack_rad: Array, signals: A
     return np.array([states.at(float(a), row) for a, row in zip(attack_rad, signals, strict=True)])
 
 
+def pitch_forces(aircraft: Aircraft, trim: Trim, attack_rad: Array, signals: Array) -> Array:
+    """(states, 2) what the lateral motion adds to Z [N] and M [N m], at the trim's elevator and no pitch rate.
+
+    Parameters
+    ----------
+    attack_rad, signals : as of `lateral_forces`.
+    """
+    states = LateralStates(aircraft, trim, forces=_PITCH_FORCES)
+    straight = np.tile(states.origin, (len(attack_rad), 1))
+    moved, still = (
+        np.array([states.at(float(a), row) for a, row in zip(attack_rad, own, strict=True)])
+        for own in (signals, straight)
+    )
+    return np.asarray(moved - still)
+
+
 def _moved(states: LateralStates, number: int, value: float) -> Array:
     signals = states.origin
     signals[number] = value
@@ -133,4 +157,12 @@ def _along(states: LateralStates, number: int) -> Callable[[float], Array]:
     return lambda value: states.at(states.trim.alpha_rad, _moved(states, number, value))
 
 
-__all__ = ["FORCES", "LateralStates", "LateralTables", "lateral_forces", "probe_lateral"]
+__all__ = [
+    "FORCES",
+    "FRAMES",
+    "LateralStates",
+    "LateralTables",
+    "lateral_forces",
+    "pitch_forces",
+    "probe_lateral",
+]

@@ -115,7 +115,11 @@ def prepare(
     _one_aircraft(logs, aircraft)
     motion = LONGITUDINAL if options.motion is None else MOTIONS[options.motion]
     controls = measured_controls(aircraft, motion)
-    signals = [undo_input_sensors(s, aircraft) for log in logs for s in read(log, motion, controls)]
+    signals = [
+        undo_input_sensors(s, aircraft)
+        for log in logs
+        for s in read(log, motion, controls, aircraft.constants)
+    ]
     signals.sort(key=lambda s: s.run_id)  # the answer does not depend on the order of the logs
     chosen = _hold_out([s.run_id for s in signals], options)
     _check(signals, chosen, logs)

@@ -12,6 +12,7 @@ from airtruth import __version__
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
 from airtruth.checks import gate
+from airtruth.checks.motions import require
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError, choices
@@ -19,7 +20,7 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.tracing.answer import ANSWER
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.budget import Advance
@@ -115,7 +116,8 @@ def begun(
     """Check the logs and search for the effects that the declared aircraft lacks, in one motion; arguments as of `trace`."""
     declared = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
     effects = _effects(options)
-    checked, forced, remarks = _checked(logs, declared, force, runs)
+    motion = MOTIONS[options.motion or LONGITUDINAL.name]
+    checked, forced, remarks = _checked(logs, declared, motion, force, runs)
     if out is not None:  # both before the search, which takes minutes
         updated_folder(declared, out)
         atomic.make_folder(out)
@@ -123,7 +125,6 @@ def begun(
     case = prepare(checked, declared, effects, options)
     advance("check the kinematics")
     # a reconstructed angle agrees with rates and accelerations by construction
-    motion = case.fitted.layout.motion
     kinematics = kinematic_check(checked, declared, _held(case), motion) if case.has_vane else None
     case = replace(case, effects=within_kinematics(case.effects, kinematics))
     search = searched(case, options, advance, kinematics)
@@ -191,11 +192,13 @@ def _words(value: object) -> str:
 
 
 def _checked(
-    logs: Logs, aircraft: Aircraft, force: bool, runs: Collection[str] | None
+    logs: Logs, aircraft: Aircraft, motion: Motion, force: bool, runs: Collection[str] | None
 ) -> tuple[list[FlightLog], list[str], tuple[str, ...]]:
     """The logs behind the gate, the faults that ``force`` overruled, and remarks for the answer."""
-    read = named_logs(logs, run_ids=runs)
-    admitted = [gate.admit(log, aircraft, source=name, force=force) for name, log in read]
+    admitted = []
+    for name, log in named_logs(logs, run_ids=runs):
+        admitted.append(gate.admit(log, aircraft, source=name, force=force))
+        require(admitted[-1].log, motion, name)
     forced = [sentence for one in admitted for sentence in one.forced]
     remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
     return [one.log for one in admitted], forced, tuple(remarks)

@@ -56,7 +56,8 @@ def p_values(batch: Batch, constants: LateralConstants, options: Options) -> Arr
         )  # the surfaces stay last: they have corners
         rows = smoothed(replace(o, regressors=regressors), plain).rows
         bread, width = bread_of(rows), rows.x.shape[1]
-        size = np.sqrt(np.einsum("rii->ri", bread)) + np.finfo(float).tiny
+        size = np.sqrt(np.einsum("rii->ri", bread))
+        size = np.where(size > 0.0, size, 1.0)  # alpha does not change where the log lacks it
         sound = np.flatnonzero(np.linalg.cond(bread / (size[:, :, None] * size[:, None, :])) < _SINGULAR)
         if not sound.size:
             continue

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -25,6 +25,7 @@ from airtruth.importers.guessing.columns import Column, GroupClock
 from airtruth.importers.guessing.readings import Candidates, Reading
 from airtruth.importers.guessing.sides import mixed_with, pair
 from airtruth.importers.guessing.slots import ALL_SLOTS, OPPOSITE, SIGN, SIGNED, SLOT_OF, size_of
+from airtruth.importers.uniform import GAP
 from airtruth.physics.atmosphere import altitude_of_pressure_m
 from airtruth.physics.motion import LATERAL as MOTION
 from airtruth.physics.motion import LONGITUDINAL
@@ -35,8 +36,8 @@ Array = NDArray[np.float64]
 _MULTIPLE, _SELDOM = 0.02, {"km_h": 0.1}
 """Frequency of a multiple of a unit (1/100 deg, mm) over that of others, where a file states no unit, and of a unit that few
 recorders have [-] (judgement)."""
-_NEVER_ASSUMED: Final = ("k", "degc", "degf", "in", "mrad", "mrad_s")
-"""Units that are taken only where a file states them: temperatures, inches, milliradians (judgement)."""
+_NEVER_ASSUMED: Final = ("k", "degc", "degf", "in", "mrad", "mrad_s", "mph", "fl")
+"""Units that are taken only where a file states them: temperatures, inches, milliradians, miles, flight levels (judgement)."""
 FORMAT, EXACT, TRIMMED, PER_WORD = 12.0, 6.0, 5.0, 0.3
 """Logarithm of the evidence of a column that the format defines, of a name, of one among known words, and the loss for each of
 them (judgement: one column of 150 000, of 400, of 150 has it by chance)."""
@@ -48,17 +49,23 @@ MIXED: Final = "one of several surfaces that are elevator and aileron together"
 
 @dataclass(frozen=True)
 class CommonTimes:
-    """Common times on which readings are compared [s]; the step is 0 where the file has no times, and t_s counts rows."""
+    """Common times on which readings are compared [s]; the step is 0 where the file has no times, and t_s counts rows.
+
+    Attributes
+    ----------
+    pauses_s : (pauses, 2) end of each pause of all columns, and the time by which the comparison closes it [s].
+    """
 
     t_s: Array
     dt_s: float
+    pauses_s: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     def of(self, column: Column, clocks: Mapping[str, GroupClock], turn: float = 0.0) -> Array | None:
         """Values of a column on the grid; None where it has no times or hardly any value. ``turn`` is the jump of an angle."""
         t = times_of(column, clocks) if self.dt_s else np.arange(float(len(column.values)))
         if t is None or len(t) != len(column.values):
             return None
-        t = rising(t)
+        t = without_pauses(rising(t), self.pauses_s)
         ok = np.isfinite(t) & np.isfinite(column.values)
         if ok.sum() < 4:
             return None
@@ -85,6 +92,27 @@ def rising(t: Array) -> Array:
         return t
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
     return np.concatenate([t[:1], t[0] + np.cumsum(np.where(steps < 0.0, usual, steps))])
+
+
+def pauses_of(t_s: Array) -> Array:
+    """(pauses, 2) end of each pause between samples, and the time beyond a usual step that it lasts [s].
+
+    A recorder that pauses between manoeuvres flies another one afterwards: a line between both is no motion.
+
+    Parameters
+    ----------
+    t_s : times of all columns, ascending [s].
+    """
+    steps = np.diff(t_s)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    long = np.flatnonzero(steps > max(GAP[0] * usual, GAP[1]))
+    return np.stack([t_s[long + 1], steps[long] - usual], axis=1)
+
+
+def without_pauses(t_s: Array, pauses_s: Array) -> Array:
+    """Times with the pauses of all columns closed, see `pauses_of` [s]."""
+    closed = np.concatenate([[0.0], np.cumsum(pauses_s[:, 1])])
+    return np.asarray(t_s - closed[np.searchsorted(pauses_s[:, 0], t_s, side="right")])
 
 
 def candidates(
@@ -312,4 +340,4 @@ def _velocity(
             )  # fmt: skip
 
 
-__all__ = ["MIXED", "CommonTimes", "candidates", "rising", "times_of"]
+__all__ = ["MIXED", "CommonTimes", "candidates", "pauses_of", "rising", "times_of", "without_pauses"]

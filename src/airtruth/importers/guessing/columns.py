@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.foreign.source import Source, further_name
-from airtruth.importers.dictionary import SHORT, Lexicon, Unit, compact
+from airtruth.importers.dictionary import DIMENSIONS, SHORT, Lexicon, Unit, compact
 from airtruth.importers.mapping import TIME_UNITS
 from airtruth.importers.uniform import even_times
 from airtruth.logs.validate import JITTER, single_precision_s
+from airtruth.units import UNITS
 
 Array = NDArray[np.float64]
 
 _CLOCK_STEP_S: Final = (1e-4, 2.0)
 """Steps of an unnamed column that may be the time [s] (judgement: 0.5 Hz to 10 kHz)."""
+_BRACKET: Final = re.compile(r"[\[(]([^\])]*)[\])]\s*$")
+"""Brackets at the end of a name, in which a unit is stated."""
 _STEPS: Final = {"s": (2e-4, 3.0), "ms": (0.5, 3e3), "us": (2e2, 3e6), "ns": (2e5, 3e9)}
 """Unit of a clock -> steps that a recorder may have in it (judgement: 0.3 Hz to 5 kHz); the first that fits is taken."""
 
@@ -38,6 +41,7 @@ class Column:
     values : (rows,).
     t_s : times that the file gives it (rows,) [s]; None if a column of the file holds them.
     date : whether it holds dates, which are read as seconds.
+    unknown : words that state a unit which the knowledge lacks; "" for none.
     """
 
     key: str | int
@@ -49,6 +53,7 @@ class Column:
     values: Array
     t_s: Array | None
     date: bool = False
+    unknown: str = ""
 
 
 def columns_of(source: Source, words: Lexicon) -> Iterator[Column]:
@@ -68,7 +73,17 @@ def columns_of(source: Source, words: Lexicon) -> Iterator[Column]:
             labels = source.labels.get(name, ("",) * values.shape[1])
             for i, label in enumerate(labels[: values.shape[1]]):
                 plain, unit = split(label, words)
-                yield Column(i + 1, name, label.strip("* "), plain, name, unit, table[:, i], None)
+                yield Column(
+                    i + 1,
+                    name,
+                    label.strip("* "),
+                    plain,
+                    name,
+                    unit,
+                    table[:, i],
+                    None,
+                    unknown=_unknown(label, words),
+                )
         else:
             own, number = repeated.get(name, (name, name))
             group, _, last = own.rpartition(".") if not source.first_line else ("", "", own)
@@ -76,17 +91,25 @@ def columns_of(source: Source, words: Lexicon) -> Iterator[Column]:
             stated = words.unit(source.units[name]) if source.units.get(name) else None
             key: str | int = int(name) if numbered else number
             date = name in source.dates
-            yield Column(key, None, own, plain, group, stated or unit, table, source.clocks.get(name), date)
+            unknown = (
+                "" if stated else _unknown(f"({text})" if (text := source.units.get(name)) else last, words)
+            )
+            yield Column(
+                key, None, own, plain, group, stated or unit, table, source.clocks.get(name), date, unknown
+            )
 
 
 def split(label: str, words: Lexicon) -> tuple[str, Unit | None]:
     """ "alpha [deg]", "* STAB POS (deg TEU)", "alpha_deg" as name and unit."""
     text = label.strip("* \t")
-    bracket = re.search(r"[\[(]([^\])]*)[\])]\s*$", text)
+    bracket = _BRACKET.search(text)
     if bracket and bracket.start():
         return text[: bracket.start()].strip(), words.unit(bracket[1])
-    if words.meanings(compact(text)):
-        return text, None
+    if meanings := words.meanings(compact(text)):
+        own = words.unit(text)  # KTAS
+        return text, own if own is not None and any(
+            own.name in UNITS[DIMENSIONS[m]] for m in meanings
+        ) else None
     parts = [part for part in re.split(r"[\s_,]+", text) if part]
     for count in (3, 2, 1):
         unit = words.unit("_".join(parts[-count:])) if len(parts) > count else None
@@ -95,6 +118,16 @@ def split(label: str, words: Lexicon) -> tuple[str, Unit | None]:
     if len(parts) > 1 and parts[-1].lower() in SHORT and words.meanings(compact("".join(parts[:-1]))):
         return "_".join(parts[:-1]), Unit(SHORT[parts[-1].lower()])
     return text, None
+
+
+def _unknown(label: str, words: Lexicon) -> str:
+    """Words in brackets at the end of a label that are neither a known unit nor a remark."""
+    bracket = _BRACKET.search(label)
+    if bracket is None or words.unit(bracket[1]) is not None:
+        return ""
+    plain = {compact(word) for word in (bracket[1], *bracket[1].split())}
+    remarks = {"", *words.context, *words.refused}
+    return "" if plain & remarks or not re.search("[^\\W\\d_]", bracket[1]) else bracket[1].strip()
 
 
 @dataclass(frozen=True)

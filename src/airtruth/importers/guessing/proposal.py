@@ -127,6 +127,11 @@ class Writer:
                 f"{r.column.full!r} counts from a point whose elevation the file does not hold; state reference_m, the "
                 "elevation above sea level, and remove the comment signs"
             )
+        if r.column.unknown and not r.unit_from:
+            return (
+                f"the file states the unit {r.column.unknown!r}, which is not known, and its size fits {r.unit!r}; state unit, "
+                "or scale where it is another one"
+            )
         if decision.lead >= CERTAIN or (slot == "altitude" and self._harmless(decision)):
             return ""
         odds = f"the odds are {np.exp(max(decision.lead, 0.0)):.2g} to 1"
@@ -250,21 +255,25 @@ class Writer:
                 continue
             if name in doubted or (name == "airspeed_m_s" and self._doubted("airspeed")):
                 continue
-            named = self.found.readings.get(SLOT_OF[name])
-            self.doubts.append(
-                f"{name}: {named[0].column.full!r} has its name, and no unit and sign fits its size and physics; check what it "
-                "holds, and state column, unit and sign"
-                if named
-                else f"{name} was not found; state its column and unit, or import a file that holds it"
-            )
-            yield f"\n# [channels.{name}] # needed, not found: {SIGNALS[name].description}"
-            yield '# column = "..."\n# unit = "..."'
+            yield from self._lacking(name)
         if not {"density_kg_m3", "altitude_m"} & self.mapped:
             self.doubts.append(
                 "density_kg_m3 or altitude_m was not found; state a column, or the density as a value"
             )
             yield "\n# [channels.density_kg_m3] # needed, or altitude_m: a column, or a number"
             yield '# value = 1.225\n# unit = "kg_m3"'
+
+    def _lacking(self, name: str) -> Iterator[str]:
+        """A channel that no column gives."""
+        named = self.found.readings.get(SLOT_OF[name])
+        self.doubts.append(
+            f"{name}: {named[0].column.full!r} has its name, and no unit and sign fits its size and physics; check what it "
+            "holds, and state column, unit and sign"
+            if named
+            else f"{name} was not found; state its column and unit, or import a file that holds it"
+        )
+        yield f"\n# [channels.{name}] # needed, not found: {SIGNALS[name].description}"
+        yield '# column = "..."\n# unit = "..."'
 
     def _doubted(self, slot: str) -> bool:
         return slot in self.decisions and ALL_SLOTS[slot][0] not in self.mapped
@@ -273,11 +282,7 @@ class Writer:
         """Columns that follow the elevator without being an angle."""
         ranked = sorted(self._effects(), key=lambda one: -abs(one[2]))[:_FEW]
         if not ranked:
-            self.doubts.append(
-                f"{name} was not found; state its column and unit, or import a file that holds it"
-            )
-            yield f"\n# [channels.{name}] # needed, not found: {SIGNALS[name].description}"
-            yield '# column = "..."\n# unit = "..."'
+            yield from self._lacking(name)
             return
         column, why, _ = ranked[0]
         if why == MIXED:

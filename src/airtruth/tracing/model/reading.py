@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.channels import BANK
-from airtruth.checks.airspeed import low_passed, speeds
+from airtruth.checks.airspeed import attitude, low_passed, speeds
 from airtruth.errors import LogError
 from airtruth.identification.lateral.observation import known_inputs
+from airtruth.identification.lateral_inputs import lateral_inputs
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.numerics.whiteness import is_white, noise_at_rest
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
@@ -71,7 +72,10 @@ def measured_controls(aircraft: Aircraft, motion: Motion) -> tuple[MeasuredContr
 
 
 def read(
-    log: FlightLog, motion: Motion = LONGITUDINAL, controls: Sequence[MeasuredControl] | None = None
+    log: FlightLog,
+    motion: Motion = LONGITUDINAL,
+    controls: Sequence[MeasuredControl] | None = None,
+    constants: object = None,
 ) -> list[Signals]:
     """The runs of a validated log.
 
@@ -93,6 +97,7 @@ def read(
     log : the log.
     motion : whose outputs and controls are read.
     controls : of each control of the motion; None where nothing is declared.
+    constants : the aircraft, whose inertias couple the motions; without them the pitch plane is one of level wings.
     """
     declared = controls or (MeasuredControl(),) * len(motion.controls)
     is_pitch = motion is LONGITUDINAL
@@ -109,7 +114,8 @@ def read(
         altitude = channels.get("altitude_m")
         if altitude is None:
             altitude = np.full(len(t), _altitude(float(density.mean())))
-        speed = speeds(channels, dt, banked=not is_pitch)
+        coupling = _coupling(channels, t, dt, sub, constants) if is_pitch else np.zeros((0, 0))
+        speed = speeds(channels, dt, banked=not is_pitch or coupling.size > 0)
         surfaces = [
             _surface(channels, control, dt, sub * FINE, own)
             for control, own in zip(motion.controls, declared, strict=True)
@@ -130,6 +136,7 @@ def read(
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
                 motion=motion,
                 **known,
+                coupling=coupling,
                 control_std_rad=np.array([s.noise_std_rad for s in surfaces]),
                 corner_rad2=_together([s.between.corner_rad2 for s in surfaces], len(t)),
                 surface_noise_rad2=_together([s.noise_rad2 for s in surfaces], len(t)),
@@ -155,6 +162,25 @@ def _completed(logged: Mapping[str, Array], t_s: Array, dt_s: float) -> dict[str
         BANK: known.phi,
     }
     return {name: x[0] for name, x in made.items()} | dict(logged)
+
+
+def _coupling(channels: Mapping[str, Array], t_s: Array, dt_s: float, sub: int, constants: object) -> Array:
+    """(2 + signals, points) see `Signals`; (0, 0) where the lateral motion is negligible.
+
+    Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1.
+    """
+    batch = Batch(
+        ("",), dt_s, t_s[None], {name: np.asarray(x, np.float64)[None] for name, x in channels.items()}
+    )
+    (turn,), (pitch,) = lateral_inputs(batch, constants)
+    if not turn.any():
+        return np.zeros((0, 0))
+    if BANK in channels:
+        alpha = channels[LONGITUDINAL.vane]
+        upright = np.cos(alpha) * np.cos(attitude(channels, dt_s))
+        turn = turn + G0 * upright * (np.cos(channels[BANK]) - 1.0) / channels["airspeed_m_s"]
+    signals = [channels.get(one.channel, np.zeros_like(turn)) for one in LATERAL.signals]
+    return np.stack([fine(low_passed(x, dt_s), sub) for x in (turn, pitch, *signals)])
 
 
 def _known(channels: Mapping[str, Array], name: str, motion: Motion, dt_s: float, sub: int) -> Array:

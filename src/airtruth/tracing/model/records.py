@@ -30,6 +30,7 @@ _SERIES: Final = (
     "density_kg_m3",
     "theta_rad",
     *OF_OTHER_MOTION,
+    "coupling",
     "corner_rad2",
     "surface_noise_rad2",
 )
@@ -58,6 +59,8 @@ class Signals:
     motion : the motion whose outputs and controls they are.
     alpha_rad, q_rad_s : (points,) known inputs on the filter's grid [rad], [rad/s]; empty where they are outputs.
     ax_m_s2, az_m_s2 : (points,) specific force along body x and z, likewise [m/s2].
+    coupling : (2 + signals, points) parts of alpha' [rad/s] and q' [rad/s2] that the lateral motion causes, then its signals
+        [rad], [rad/s]; empty where it causes none.
     control_std_rad : (controls,) standard deviation of the noise that remains in each smoothed control [rad]; 0 behind a
         damper, which turns the surface throughout, so that a play does not rest at the extremes of the noise.
     corner_rad2 : (controls, samples) variance of a control's mean over the cell that ends at each sample, about that of
@@ -85,6 +88,7 @@ class Signals:
     q_rad_s: Array = field(default_factory=lambda: np.zeros(0))
     ax_m_s2: Array = field(default_factory=lambda: np.zeros(0))
     az_m_s2: Array = field(default_factory=lambda: np.zeros(0))
+    coupling: Array = field(default_factory=lambda: np.zeros((0, 0)))
     control_std_rad: Array = field(default_factory=lambda: np.zeros(1))
     corner_rad2: Array = field(default_factory=lambda: np.zeros((1, 0)))
     surface_noise_rad2: Array = field(default_factory=lambda: np.zeros((1, 0)))

@@ -22,6 +22,8 @@ MOST_LINES: Final = 40
 """Lines of the text [-] (judgement: one screen)."""
 _MOST_CANDIDATES: Final = 3
 """Candidates of an answer without an effect [-] (judgement)."""
+_REASON: Final = "provisional"
+"""Word of a note that makes an answer provisional."""
 _SHOWN: Final = ("declared", "before", "after", "floor")
 """Stages of the short table of errors."""
 
@@ -38,8 +40,16 @@ def as_brief_text(answer: TraceAnswer) -> str:
             for line in (effect_line(e), _significance(e.p_value, e.indistinguishable_from))
         ),
     ]
-    notes = _notes(answer)
-    optional = [_errors(answer), _derivatives(answer), _outcome(answer), *notes, *_causes(answer)]
+    notes, outcome = _notes(answer), _outcome(answer)
+    reasons = sum(_REASON in note for note in answer.notes)
+    optional = [
+        *notes[:reasons],
+        _errors(answer),
+        _derivatives(answer),
+        outcome,
+        *notes[reasons:],
+        *_causes(answer),
+    ]
     room = MOST_LINES - sum(map(_height, head)) - _height(_more(len(notes)))
     kept = []
     for block in optional:
@@ -48,7 +58,7 @@ def as_brief_text(answer: TraceAnswer) -> str:
             room -= _height(block)
     left_out = sum(note not in kept for note in notes)
     # the next step is the last block; notes come before it
-    ordered = [b for b in kept if b != optional[2]] + [b for b in kept if b == optional[2]]
+    ordered = [b for b in kept if b != outcome] + [b for b in kept if b == outcome]
     blocks = [*head, *ordered, _more(left_out)]
     return "\n\n".join("\n".join(block) for block in blocks if block)
 
@@ -122,7 +132,7 @@ def _outcome(answer: TraceAnswer) -> Block:
 
 def _notes(answer: TraceAnswer) -> list[Block]:
     """Notes, those first that make the answer provisional."""
-    ordered = sorted(answer.notes, key=lambda note: "provisional" not in note)
+    ordered = sorted(answer.notes, key=lambda note: _REASON not in note)
     return [tuple(wrapped("Note", note + ".")) for note in ordered]
 
 

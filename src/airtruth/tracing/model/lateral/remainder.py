@@ -12,7 +12,6 @@ coefficients. For the GTM it is below 1 % of the range of a coefficient.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +21,11 @@ from airtruth.physics.linear_model import places
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.motion_parts import reference_length_m
 from airtruth.simulation.disposable import isolated_flight
-from airtruth.simulation.probe_lateral import lateral_forces
+from airtruth.simulation.probe_lateral import FRAMES, lateral_forces
 from airtruth.tracing.model.plant import FLOW, Plant, looked_up
 from airtruth.tracing.model.records import Signals
 
 Array = NDArray[np.float64]
-
-_FRAMES: Final = 50
-"""Frames of JSBSim for which filters and engines settle in one state [-] (`airtruth.simulation.probe`)."""
 
 
 def along_record(s: Signals, constants: Constants) -> Array:
@@ -66,7 +62,7 @@ def _beyond_tables(s: Signals, plant: Plant) -> Array | None:
     lengths = [None if x.length is None else reference_length_m(c, x.length) for x in LATERAL.signals]
     states = inside * np.array([1.0 if x is None else 2.0 * at.airspeed_m_s / x for x in lengths])
     flown = isolated_flight(
-        _FRAMES * len(states),
+        FRAMES * len(states),
         f"the lateral forces of {plant.aircraft.name}",
         lateral_forces,
         plant.aircraft,

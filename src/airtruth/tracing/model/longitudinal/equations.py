@@ -5,9 +5,9 @@ the upward gust as the tail meets it, three low-passed copies of the first Dryde
 
 The upward gust is w = sigma (1.22 x_2 - 0.52 x_3 + rolloff sum_i g_i (x_2 - x_i)). Without rolloff its spectrum is
 Dryden's; with a rolloff of 1 it falls as von Karman's, with the power -5/3 instead of -2, in the band that a flight
-test excites. Airspeed, density, pitch attitude and the speed without the gust along the path are known inputs. The
-angle of attack of the air is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate
-q - (w - w_late)/(tau V) with tau = 4 b/(pi V).
+test excites. Airspeed, density, pitch attitude, the speed without the gust along the path, and what roll, yaw and bank add to
+alpha' and q' are known inputs. The angle of attack of the air is theta - asin((V_ground sin(theta - alpha) - w)/V), its
+pitch rate q - (w - w_late)/(tau V) with tau = 4 b/(pi V).
 
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, constants over alpha, increments of the
 derivatives, and the terms of `airtruth.physics.terms`.
@@ -154,7 +154,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     upward = gust(x, gusts.rolloff)
     alpha = air_alpha(x, upward, gusts.level_m_s, at)
     cosine, sine = math.cos(alpha), math.sin(alpha)
-    weight = G0 * math.cos(at.theta_rad - x[0]) / ground
+    weight = G0 * math.cos(at.theta_rad - x[0]) / ground + at.turn_rad_s
     q = x[1]
     late = (upward - x[4]) / gusts.rotary_time_s
     surface = effective_elevator(at.elevator_rad, aircraft)
@@ -181,7 +181,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
         + (aircraft.thrust_n + aircraft.thrust_slope_m2 * qbar) * aircraft.thrust_arm_m
     )
     out[0] = q + (fz * cosine - fx * sine) / (mass * ground) + weight
-    out[1] = fm / aircraft.inertia_kg_m2
+    out[1] = fm / aircraft.inertia_kg_m2 + at.pitch_rad_s2
     gust_rates(x, GUST_1, v, late, gusts, out)
     effect_rates(x, AirSignals(alpha, surface, qhat, out[0] * half, qbar), model, out)
     return float(fz / mass)
@@ -229,6 +229,8 @@ def air_at(grid: AirInputs[Array], point: int) -> AirPoint:
         grid.ground_m_s[point],
         grid.qbar_pa[point],
         grid.theta_rad[point],
+        grid.turn_rad_s[point],
+        grid.pitch_rad_s2[point],
         grid.lift[point],
         grid.moment[point],
     )
@@ -271,8 +273,10 @@ def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
         at.ground_m_s,
         at.qbar_pa,
         at.theta_rad,
-        at.lift + (by if field == 5 else 0.0),
-        at.moment + (by if field == 6 else 0.0),
+        at.turn_rad_s,
+        at.pitch_rad_s2,
+        at.lift + (by if field == 7 else 0.0),
+        at.moment + (by if field == 8 else 0.0),
     )
 
 

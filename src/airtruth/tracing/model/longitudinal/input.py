@@ -58,6 +58,7 @@ class AirInputs(NamedTuple, Generic[T]):
     airspeed_m_s, ground_m_s : speed through the air, and without the gust along the path [m/s].
     qbar_pa : dynamic pressure [Pa].
     theta_rad : pitch attitude [rad].
+    turn_rad_s, pitch_rad_s2 : parts of alpha' [rad/s] and q' [rad/s2] that the other motion causes.
     lift, moment : increments of CL and Cm [-].
     """
 
@@ -66,6 +67,8 @@ class AirInputs(NamedTuple, Generic[T]):
     ground_m_s: T
     qbar_pa: T
     theta_rad: T
+    turn_rad_s: T
+    pitch_rad_s2: T
     lift: T
     moment: T
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.longitudinal.input import AircraftArrays, AirInputs
-from airtruth.tracing.model.packing import Packing, turned_increments
+from airtruth.tracing.model.packing import AirPath, Packing, turned_increments
 from airtruth.tracing.model.parameters import SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.records import Signals
 
 Array = NDArray[np.float64]
 
@@ -46,7 +48,12 @@ def pack_aircraft(
     )
 
 
-PACKING: Final = Packing(AirInputs, lambda s, compiled, air: air, pack_aircraft)
+def _known(s: Signals, compiled: CompiledChange, air: AirPath) -> Sequence[Array]:
+    """Known inputs of `AirInputs`."""
+    return *air, *(s.coupling[:2] if s.coupling.size else np.zeros((2, len(air.theta_rad))))
+
+
+PACKING: Final = Packing(AirInputs, _known, pack_aircraft)
 """Packing of records of the pitch plane."""
 
 __all__ = ["PACKING", "pack_aircraft"]

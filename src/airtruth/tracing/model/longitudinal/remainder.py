@@ -9,25 +9,30 @@ The differences hold everything that a state at rest does not show: servos and l
 alpha', engines that follow, asymmetry, flexibility of the tables between their points. They are known before anything is
 fitted, and the filter adds them to its coefficients. The dynamics that aircraft.toml declares are the filter's own: their
 increments are left out.
+
+This flight has level wings. In a record whose lateral motion counts, the forces that sideslip, roll, yaw, ailerons and rudder
+add are evaluated in JSBSim at their measured values: the ailerons of the GTM at 3.5 deg pitch it by 0.25 rad/s2.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft.dynamics import declared_dynamics
+from airtruth.physics.motion import LATERAL
 from airtruth.physics.readings import state_of
 from airtruth.simulation.disposable import isolated_flight
+from airtruth.simulation.probe_lateral import FRAMES, pitch_forces
 from airtruth.simulation.replay import each_flown_through
 from airtruth.simulation.tracks import Track, substeps
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.increment_response import increments
 from airtruth.tracing.model.plant import LAYOUTS, Plant, looked_up
-from airtruth.tracing.model.probed import probed
+from airtruth.tracing.model.probed import probed, trim_of
 from airtruth.tracing.model.records import FINE, Signals
 from airtruth.tracing.model.surface import through
 
@@ -63,7 +68,44 @@ def remainders(signals: Sequence[Signals], plants: Sequence[Plant]) -> list[Arra
         )
         for (i, s, plant, at), own in zip(part, flown, strict=True):
             found[i] = None if own is None else _beyond_tables(s, plant, at, own)
-    return found
+    return [
+        more if added is None else added + (0.0 if more is None else more)
+        for more, added in zip(found, _beside_lateral(signals, plants), strict=True)
+    ]
+
+
+def _beside_lateral(signals: Sequence[Signals], plants: Sequence[Plant]) -> Iterator[Array | None]:
+    """(2, points) increments of CL and Cm that the lateral motion adds to each record; None where it does not count."""
+    trims: dict[int, Trim] = {}
+    for s, plant in zip(signals, plants, strict=True):
+        at, c = plant.trim, plant.aircraft.constants
+        own = plant.aircraft.file.jsbsim
+        if (
+            not s.coupling.size
+            or at is None
+            or own is None
+            or not all(getattr(own, x.name) for x in LATERAL.controls)
+        ):
+            yield None
+            continue
+        if id(at) not in trims:
+            where = at.airspeed_m_s, at.density_kg_m3, at.condition.altitude_m, at.condition.gamma_rad
+            trims[id(at)] = trim_of(plant.aircraft, *where, LATERAL)
+        level = trims[id(at)]
+        states, samples = s.coupling[2:, :: s.sub].T, s.y.shape[0]
+        added = isolated_flight(
+            2 * FRAMES * samples,
+            f"the forces of {plant.aircraft.name} in roll and yaw",
+            pitch_forces,
+            plant.aircraft,
+            level,
+            s.y[:, 0],
+            states,
+        )
+        force = 0.5 * level.density_kg_m3 * level.airspeed_m_s**2 * c.wing_area_m2
+        grid = np.arange((samples - 1) * s.sub + 1) / s.sub
+        rows = (-added[:, 0] / force, added[:, 1] / (force * c.chord_m))
+        yield np.stack([np.interp(grid, np.arange(samples), row) for row in rows])
 
 
 def _beyond_tables(signals: Signals, plant: Plant, at: Trim, flown: Mapping[str, Array]) -> Array:

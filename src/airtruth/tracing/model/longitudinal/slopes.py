@@ -156,7 +156,8 @@ def _all_terms(
     """Add the derivatives of the effects' terms of CL and Cm; ``own``: CL of the increments without them."""
     aircraft, effects, half = model.aircraft, model.effects, half_time(at, model)
     force, alpha, mass = at.qbar_pa * aircraft.area_m2, signals.alpha, aircraft.mass_kg
-    loss, weight = half * force / (mass * at.airspeed_m_s), G0 * math.cos(at.theta_rad - x[0]) / at.ground_m_s
+    loss = half * force / (mass * at.airspeed_m_s)
+    weight = G0 * math.cos(at.theta_rad - x[0]) / at.ground_m_s + at.turn_rad_s
     fz = f.z - force * (own + terms(x, signals, effects, False, 0.0)[0])
     first = x[1] + (fz * math.cos(alpha) - f.x * math.sin(alpha)) / (mass * at.ground_m_s) + weight
     turned = AirSignals(alpha, signals.elevator, signals.qhat, first * half, signals.qbar)
