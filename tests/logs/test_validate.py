@@ -65,7 +65,7 @@ def test_implausible_values(log: FlightLog, channel: str, value: float, part: st
 
 
 def test_missing_channels_name_the_nearest_column(log: FlightLog) -> None:
-    channels = {**without(log, "alpha_rad", "az_m_s2"), "alpha_deg": np.zeros(100)}
+    channels = {**without(log, "alpha_rad", "az_m_s2", "p_rad_s", "rudder_rad"), "alpha_deg": np.zeros(100)}
     message = complaint(replace(log, channels=channels))
     assert "2 problems" in message
     assert "alpha_rad: required channel is missing (angle of attack, nose-up positive)" in message
@@ -73,8 +73,15 @@ def test_missing_channels_name_the_nearest_column(log: FlightLog) -> None:
     assert "az_m_s2: required channel is missing" in message
 
 
+def test_a_log_of_the_lateral_motion_alone_passes(log: FlightLog) -> None:
+    channels = without(log, "alpha_rad", "q_rad_s", "theta_rad", "az_m_s2", "elevator_rad")
+    validate(replace(log, channels=channels))
+    misspelt = {**channels, "alfa_rad": np.zeros(100)}
+    assert "the nearest column is 'alfa_rad'" in complaint(replace(log, channels=misspelt))
+
+
 def test_a_missing_elevator_names_what_a_mapping_states_of_a_servo_output(log: FlightLog) -> None:
-    message = complaint(replace(log, channels=without(log, "elevator_rad")))
+    message = complaint(replace(log, channels=without(log, "elevator_rad", "rudder_rad")))
     assert "a servo output with calibration = [[output, deflection], [output, deflection]]" in message
     assert "elevons with columns and weights, on import" in message
 
@@ -149,7 +156,7 @@ def test_all_problems_at_once(log: FlightLog) -> None:
     t = log.t_s.copy()
     t[45:70] += 0.3
     bad = with_channel(with_time(log, t), "alpha_rad", 3, np.nan)
-    bad = replace(bad, channels=without(bad, "elevator_rad"), metadata={"sample_rate_hz": 100})
+    bad = replace(bad, channels=without(bad, "elevator_rad", "rudder_rad"), metadata={"sample_rate_hz": 100})
     with pytest.raises(LogError, match=r"^flight-7\.parquet: 4 problems\n") as caught:
         validate(bad, source="flight-7.parquet")
     for part in (

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import report_samples
 from matplotlib.figure import Figure
 from report_records import GTM, METHODS, answer, histories, log
 from scipy.stats import binom, t
@@ -31,7 +32,6 @@ from airtruth.reporting.statistics import (
     Statistic,
     difference,
     influence,
-    relative_error,
 )
 from airtruth.table import WIDTH, significant
 from airtruth.tracing.presentation.charts import innovations_chart, scores_chart, trace_chart
@@ -54,7 +54,7 @@ def statistics(errors, hits):
             coverage=Statistic(np.r_[np.array(hits[m]) / n, 1.0, 1.0], np.zeros(8)),
             median=np.zeros(8),
             mad=np.zeros(8),
-            relerr=relative_error(e, TRUTH),
+            relerr=report_samples.relative_error(e, TRUTH),
             relerr_modal=empty,
             iterations=Statistic(np.array(0.0), np.array(0.0)),
             correlation=np.eye(6),

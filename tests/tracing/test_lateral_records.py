@@ -116,7 +116,7 @@ def test_ailerons_pitch_the_gtm():
     """-66 +- 1.3 1/s2 for the square of the aileron, by least squares on q' of six flights in calm air (combined.toml)."""
     at = trim_of(GTM, SPEED, DENSITY, ALTITUDE, 0.0, LATERAL)
     signals = np.tile(at.origin(LATERAL), (3, 1))
-    signals[1:, LATERAL.column("aileron")] += np.array([3.5, -3.5]) * DEG
+    signals[1:, NAMES.index("aileron")] += np.array([3.5, -3.5]) * DEG
     forces = pitch_forces(GTM, at, np.full(3, at.alpha_rad), signals)
     assert np.abs(forces[0]).max() < 1e-9
     assert forces[1:, 1].mean() / GTM.constants.inertia_yy_kg_m2 == pytest.approx(

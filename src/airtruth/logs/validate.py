@@ -34,6 +34,8 @@ _SHOWN: Final = 3
 """Number of runs that a sentence names."""
 _GAP: Final = 1.5
 """Least length of a gap [steps]."""
+_MISSPELT: Final = 0.75
+"""Similarity from which a column counts as a misspelt channel [-] (judgement: alfa_rad has 0.82 of alpha_rad)."""
 _POSITIVE: Final = ("airspeed_m_s", "density_kg_m3")
 """Channels whose values must be positive."""
 _NO_VANE: Final = ", or without a vane state [reconstruct] alpha = true,"
@@ -103,12 +105,18 @@ def row_problems(log: FlightLog) -> Iterator[str]:
 
 
 def _missing(log: FlightLog) -> Iterator[str]:
-    """Channels that the motion lacks of whose channels the log holds the most, the pitch plane if both lack as many."""
+    """Channels that the motion lacks of whose channels the log holds the most, the pitch plane if both lack as many.
+
+    A channel of the pitch plane is missing in a log of the lateral motion too where a column has nearly its name.
+    """
     motion = min(MOTIONS.values(), key=lambda m: len({*m.required} - {*log.channels}))
     present = [name for name in log.channels if name not in SIGNALS]
-    for name in motion.required:
+    for name in dict.fromkeys((*motion.required, *LONGITUDINAL.required)):
         if name not in log.channels:
-            near = difflib.get_close_matches(name, present, n=1, cutoff=0.5)
+            needed = name in motion.required
+            near = difflib.get_close_matches(name, present, n=1, cutoff=0.5 if needed else _MISSPELT)
+            if not needed and not near:
+                continue
             step = f"the nearest column is {near[0]!r}: map it" if near else "map a column to it"
             if not near:
                 controls = [one.channel for one in motion.controls]

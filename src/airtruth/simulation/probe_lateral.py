@@ -32,8 +32,8 @@ FRAMES: Final = 50
 """Frames of JSBSim for which filters and engines settle in one state [-] (`airtruth.simulation.probe`)."""
 _PITCH_FORCES: Final = ("forces/fbz-total-lbs", "moments/m-total-lbsft")
 """Force along body z [lbf] and pitching moment about the CG [lbf ft], without gravity."""
-_UNITS: Final = {"forces": LBF, "moments": LBF * FT}
-"""Kind of a property -> factor to N or N m."""
+_UNITS: Final = {"lbs": LBF, "lbsft": LBF * FT}
+"""End of a property -> factor to N or N m."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class LateralStates:
         executive = Executive(aircraft, dt_s)
         self.model = executive.model
         self._forces = executive.nodes(forces)
-        self._units = np.array([_UNITS[name.partition("/")[0]] for name in forces])
+        self._units = np.array([_UNITS[name.rpartition("-")[2]] for name in forces])
         self._states = HeldStates(executive, trim)
 
     @property
