@@ -108,6 +108,13 @@ def test_the_updated_aircraft_of_no_effect_is_beside_the_refitted_derivatives(an
     assert all(len([cell for cell in row if cell is not MISSING]) == 4 for row in group.rows)
 
 
+def test_the_reason_of_a_provisional_answer_is_on_the_first_screen(answer):
+    reason = "in JSBSim the updated aircraft is worse, so the answer is provisional"
+    many = tuple(f"note {number} of a record that says nothing of the answer" for number in range(12))
+    text = as_brief_text(replace(answer, provisional=True, notes=(*many, reason)))
+    assert reason in " ".join(text.split())
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [

@@ -23,6 +23,12 @@ Array = NDArray[np.float64]
 _LEAST: Final = 0.02
 """Pitch rate that the lateral motion causes, over that of the record, from which the motion is an input [-]; judgement: below it
 the derivatives move by less than their standard errors in a record."""
+ROLLS: Final = (
+    "Warning: the lateral motion causes part of the pitch rate. Roll, yaw, sideslip and bank are known inputs. The lift and the "
+    "pitching moment of sideslip, ailerons and rudder are left out and may bias the estimates; use records of the elevator "
+    "alone, or `airtruth trace`, which has these forces of the JSBSim model"
+)
+"""Warning about records in which the lateral motion is an input."""
 _Q, _P, _R = (s.channel for m in (LONGITUDINAL, LATERAL) for s in m.signals if s.length is not None)
 
 
@@ -58,4 +64,4 @@ def lateral_inputs(batch: Batch, constants: object) -> tuple[Array, Array]:
     return np.where(counts, alpha_rate_rad_s, 0.0), np.where(counts, q_rate_rad_s2, 0.0)
 
 
-__all__ = ["lateral_inputs"]
+__all__ = ["ROLLS", "lateral_inputs"]

@@ -27,6 +27,8 @@ def odds_lines(answer: TraceAnswer) -> tuple[str, ...]:
     wider = [s for s in others if set(s.effects) > names and s.weight >= _LEAST_WIDER]
     rivals = [s for s in others if not set(s.effects) > names]
     words = f"Posterior of {_named(own)}: {_percent(own.weight)}"
+    if answer.verdict == "unexplained":
+        words = f"Among the sets of the library, none of which explains these records, {_named(own)} has {_percent(own.weight)}"
     if rivals:
         words += f"; odds of {_odds(own, rivals[0])} against {_named(rivals[0])}, the next one"
     lines = [f"{words}."]
