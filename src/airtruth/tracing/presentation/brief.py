@@ -41,24 +41,17 @@ def as_brief_text(answer: TraceAnswer) -> str:
         ),
     ]
     notes, outcome = _notes(answer), _outcome(answer)
-    reasons = sum(_REASON in note for note in answer.notes)
-    optional = [
-        *notes[:reasons],
-        _errors(answer),
-        _derivatives(answer),
-        outcome,
-        *notes[reasons:],
-        *_causes(answer),
-    ]
+    optional = [_errors(answer), _derivatives(answer), outcome, *notes, *_causes(answer)]
+    reasons = notes[: sum(_REASON in note for note in answer.notes)]
     room = MOST_LINES - sum(map(_height, head)) - _height(_more(len(notes)))
     kept = []
-    for block in optional:
+    for block in (*reasons, *(one for one in optional if one not in reasons)):
         if _height(block) <= room:
             kept.append(block)
             room -= _height(block)
     left_out = sum(note not in kept for note in notes)
     # the next step is the last block; notes come before it
-    ordered = [b for b in kept if b != outcome] + [b for b in kept if b == outcome]
+    ordered = [b for b in optional if b in kept and b != outcome] + [b for b in kept if b == outcome]
     blocks = [*head, *ordered, _more(left_out)]
     return "\n\n".join("\n".join(block) for block in blocks if block)
 
