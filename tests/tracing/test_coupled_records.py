@@ -63,5 +63,8 @@ def test_level_wings_and_an_aircraft_without_inertias_have_none():
 def test_the_pitch_plane_of_records_of_both_motions_lacks_nothing(tmp_path):
     """Aileron and rudder beside the elevator: without the coupling the answer was unexplained, p = 7e-84."""
     fly("data/campaigns/combined.toml", out=tmp_path / "both", runs=6)
-    answer = trace(tmp_path / "both", "gtm", TraceOptions(motion="longitudinal", increments=False))
+    options = TraceOptions(motion="longitudinal", increments=False)
+    answer = trace(tmp_path / "both", "gtm", options, out=tmp_path / "traced").answer
     assert answer.verdict == "none"
+    assert answer.replay.declared is None  # a flight with level wings
+    assert not any("disagree" in note for note in answer.notes)

@@ -45,8 +45,9 @@ def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) 
 
     Returns
     -------
-    Errors of both aircraft; an empty `Replay` for an aircraft without JSBSim, for a trace with the linear model, and where
-    the motion leaves the range of the simulation.
+    Errors of both aircraft; an empty `Replay` for an aircraft without JSBSim, for a trace with the linear model, for records
+    whose lateral motion moves the pitch plane, because this flight has level wings, and where the motion leaves the range of
+    the simulation.
 
     Raises
     ------
@@ -55,9 +56,11 @@ def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) 
     """
     if aircraft.file.jsbsim is None or stages.case.model != "aircraft":
         return Replay()
+    problem = stages.reported[0]
+    if any(r.signals.coupling.size for r in problem.records):
+        return Replay()
     new = None if updated is None else planes.load(updated)
     weights = _weights(stages)
-    problem = stages.reported[0]
     try:
         return Replay(
             declared=_errors(problem, aircraft, weights),
