@@ -40,19 +40,26 @@ def as_brief_text(answer: TraceAnswer) -> str:
             for line in (effect_line(e), _significance(e.p_value, e.indistinguishable_from))
         ),
     ]
-    notes, outcome = _notes(answer), _outcome(answer)
-    optional = [_errors(answer), _derivatives(answer), outcome, *notes, *_causes(answer)]
-    reasons = notes[: sum(_REASON in note for note in answer.notes)]
-    room = MOST_LINES - sum(map(_height, head)) - _height(_more(len(notes)))
-    kept = []
-    for block in (*reasons, *(one for one in optional if one not in reasons)):
-        if _height(block) <= room:
-            kept.append(block)
-            room -= _height(block)
-    left_out = sum(note not in kept for note in notes)
+    notes = _notes(answer)
     # the next step is the last block; notes come before it
-    ordered = [b for b in optional if b in kept and b != outcome] + [b for b in kept if b == outcome]
-    blocks = [*head, *ordered, _more(left_out)]
+    optional = [_errors(answer), _derivatives(answer), *notes, *_causes(answer), _outcome(answer)]
+    reasons = range(2, 2 + sum(_REASON in note for note in answer.notes))
+    # reasons have room first, and the next step has it before notes
+    wanted = [
+        *reasons,
+        0,
+        1,
+        len(optional) - 1,
+        *(k for k in range(2, len(optional) - 1) if k not in reasons),
+    ]
+    room = MOST_LINES - sum(map(_height, head)) - _height(_more(len(notes)))
+    kept: set[int] = set()
+    for k in wanted:
+        if _height(optional[k]) <= room:
+            kept.add(k)
+            room -= _height(optional[k])
+    left_out = len(notes) - sum(2 <= k < 2 + len(notes) for k in kept)
+    blocks = [*head, *(optional[k] for k in sorted(kept)), _more(left_out)]
     return "\n\n".join("\n".join(block) for block in blocks if block)
 
 
