@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_record import InstrumentError, Kinematics, Samples, stacked, thinned
 from airtruth.checks.pitch_motions import pitch_motions
-from airtruth.checks.rotation import across_flow, alpha_coupling, pitch_coupling
+from airtruth.checks.rotation import across_flow, alpha_coupling, alpha_gravity, pitch_coupling
 from airtruth.checks.samples import derivative, earlier, integral, lagged
 from airtruth.physics.motion import LONGITUDINAL as MOTION
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
@@ -80,8 +80,8 @@ class LongitudinalSamples(Samples):
         if p is None or r is None or phi is None or beta is None:
             return None
         theta = self.theta if self.theta is not None else self.alpha
-        lift = G0 * np.cos(self.alpha) * np.cos(theta) * (np.cos(phi) - 1.0) / self.airspeed
-        alpha = alpha_coupling(p, r, self.alpha, beta) + lift
+        sink = alpha_gravity(self.alpha, theta, phi) / self.airspeed
+        alpha = alpha_coupling(p, r, self.alpha, beta) + sink
         return integral(pitch_coupling(self.q, r, phi), self.dt_s), integral(alpha, self.dt_s)
 
 

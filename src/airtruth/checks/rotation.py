@@ -50,6 +50,11 @@ def alpha_coupling(p: Array, r: Array, alpha: Array, beta: Array) -> Array:
     return np.asarray(-(p * np.cos(alpha) + r * np.sin(alpha)) * np.tan(beta))
 
 
+def alpha_gravity(alpha: Array, theta: Array, phi: Array) -> Array:
+    """Gravity across the path in a bank less that with level wings, g cos a cos theta (cos phi - 1) [m/s2]."""
+    return np.asarray(G0 * np.cos(alpha) * np.cos(theta) * (np.cos(phi) - 1.0))
+
+
 def sideslip_turn(p: Array, r: Array, alpha: Array) -> Array:
     """Part of the rate of beta that rotation makes, p sin a - r cos a [rad/s]."""
     return np.asarray(p * np.sin(alpha) - r * np.cos(alpha))
@@ -100,6 +105,7 @@ def headed(c: Channels, dt_s: float) -> Array:
 __all__ = [
     "across_flow",
     "alpha_coupling",
+    "alpha_gravity",
     "bank_coupling",
     "banked",
     "given",

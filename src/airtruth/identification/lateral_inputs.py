@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.checks.rotation import alpha_coupling
 from airtruth.checks.spectra import integral
 from airtruth.identification.record_constants import stated_value
 from airtruth.logs.flight_log import Batch
@@ -53,7 +54,7 @@ def lateral_inputs(batch: Batch, constants: object) -> tuple[Array, Array]:
         return nothing
     p, r = c[_P], c[_R]
     q_rate_rad_s2 = ((izz - ixx) * p * r - ixz * (p**2 - r**2)) / iyy
-    alpha_rate_rad_s = -(p * np.cos(alpha) + r * np.sin(alpha)) * np.tan(c[LATERAL.vane])
+    alpha_rate_rad_s = alpha_coupling(p, r, alpha, c[LATERAL.vane])
     caused = integral(q_rate_rad_s2, batch.dt_s)
     # a constant moment is a trim: its integral is a trend
     time = np.linspace(-1.0, 1.0, q.shape[1])

@@ -137,7 +137,7 @@ def shortest_s(rate_hz: float) -> float:
 def _without_gaps(candidate: CandidateManoeuvre, used: Mapping[str, Series]) -> CandidateManoeuvre:
     """The candidate, not accepted where a recorder paused within it."""
     for name, one in used.items():
-        for low, high in gaps(one):
+        for low, high in gaps(one.t_s):
             if high > candidate.start_s and low < candidate.end_s:
                 reason = f"{name} has a gap of {high - low:.3g} s"
                 text = f"{candidate.reason}; {reason}" if candidate.reason else reason

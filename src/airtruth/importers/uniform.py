@@ -145,8 +145,8 @@ def slower(series: Mapping[str, Series], rate_hz: float) -> dict[str, float]:
 
 def jitter_of(one: Series) -> float:
     """Largest departure of a step from the usual one, as a share of it, without pauses and lost samples [-]."""
-    steps = np.diff(one.t_s[np.isfinite(one.t_s)]) if not one.constant else np.empty(0)
-    if len(steps) < 2 or not (steps > 0.0).all():
+    steps = _steps(one)
+    if not len(steps):
         return 0.0
     usual = float(np.median(steps))
     apart = np.abs(steps - usual)[steps < 1.5 * usual] / usual
@@ -157,12 +157,18 @@ def jitter_of(one: Series) -> float:
 
 def lost_of(one: Series) -> tuple[int, float]:
     """Number of samples that are missing between others, and the longest time between two samples [s]; 0 and 0 for none."""
-    steps = np.diff(one.t_s[np.isfinite(one.t_s)]) if not one.constant else np.empty(0)
-    if len(steps) < 2 or not (steps > 0.0).all():
+    steps = _steps(one)
+    if not len(steps):
         return 0, 0.0
     usual = float(np.median(steps))
     long = steps[steps >= 1.5 * usual]
     return int((np.round(long / usual) - 1.0).sum()), float(long.max(initial=0.0))
+
+
+def _steps(one: Series) -> Array:
+    """Steps of the times of a channel [s]; none of a constant, and where they do not increase."""
+    steps = np.diff(one.t_s[np.isfinite(one.t_s)]) if not one.constant else np.empty(0)
+    return steps if len(steps) > 1 and (steps > 0.0).all() else np.empty(0)
 
 
 def _phase(full: Mapping[str, Series], start: float, end: float, rate_hz: float) -> float:
@@ -289,18 +295,18 @@ def _check_times(where: str, name: str, t: Array) -> None:
         )
 
 
-def gaps(one: Series) -> list[tuple[float, float]]:
-    """Start and end of pauses between samples that are far longer than the usual step, `GAP` [s]."""
-    steps = np.diff(one.t_s)
+def gaps(t_s: Array) -> list[tuple[float, float]]:
+    """Start and end of pauses between samples (samples,) that are far longer than the usual step, `GAP` [s]."""
+    steps = np.diff(t_s)
     if not len(steps):
         return []
     long = np.flatnonzero(steps > max(GAP[0] * float(np.median(steps)), GAP[1]))
-    return [(float(one.t_s[i]), float(one.t_s[i + 1])) for i in long]
+    return [(float(t_s[i]), float(t_s[i + 1])) for i in long]
 
 
 def _check_gaps(where: str, name: str, one: Series, start: float, end: float) -> None:
     """Refuse to invent samples where a recorder paused."""
-    inside = [(low, high) for low, high in gaps(one) if high > start and low < end]
+    inside = [(low, high) for low, high in gaps(one.t_s) if high > start and low < end]
     if inside:
         low, high = max(inside, key=lambda g: g[1] - g[0])
         raise LogError(

@@ -88,6 +88,10 @@ class LateralStates:
         with_surfaces(lambda moved: self._states.respond(condition, moved), controls, wanted)
         return np.asarray(np.array([node.get_double_value() for node in self._forces]) * self._units)
 
+    def each(self, attack_rad: Array, signals: Array) -> Array:
+        """(states, forces) as `at`, of angles of attack (states,) and signals (states, signals)."""
+        return np.array([self.at(float(a), row) for a, row in zip(attack_rad, signals, strict=True)])
+
 
 def probe_lateral(aircraft: Aircraft, trim: Trim, grid: ForceGrid) -> LateralTables:
     """Tabulate the lateral forces and moments at the trim's throttle, elevator and altitude.
@@ -126,8 +130,7 @@ def lateral_forces(aircraft: Aircraft, trim: Trim, attack_rad: Array, signals: A
     ----------
     attack_rad : (states,) [rad]; signals : (states, signals) as of `LateralStates.origin`.
     """
-    states = LateralStates(aircraft, trim)
-    return np.array([states.at(float(a), row) for a, row in zip(attack_rad, signals, strict=True)])
+    return LateralStates(aircraft, trim).each(attack_rad, signals)
 
 
 def pitch_forces(aircraft: Aircraft, trim: Trim, attack_rad: Array, signals: Array) -> Array:
@@ -139,11 +142,7 @@ def pitch_forces(aircraft: Aircraft, trim: Trim, attack_rad: Array, signals: Arr
     """
     states = LateralStates(aircraft, trim, forces=_PITCH_FORCES)
     straight = np.tile(states.origin, (len(attack_rad), 1))
-    moved, still = (
-        np.array([states.at(float(a), row) for a, row in zip(attack_rad, own, strict=True)])
-        for own in (signals, straight)
-    )
-    return np.asarray(moved - still)
+    return states.each(attack_rad, signals) - states.each(attack_rad, straight)
 
 
 def _moved(states: LateralStates, number: int, value: float) -> Array:

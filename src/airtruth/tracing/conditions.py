@@ -18,7 +18,7 @@ from airtruth.simulation.trim import Trim
 from airtruth.tracing.model.lateral.remainder import along_record, lateral_remainders
 from airtruth.tracing.model.longitudinal.remainder import remainders
 from airtruth.tracing.model.plant import FLOW, Plant, declared_derivatives, linear
-from airtruth.tracing.model.probed import engines, probed, probed_lateral, trim_of, with_throttle
+from airtruth.tracing.model.probed import engines, flies, probed, probed_lateral, trim_of, with_throttle
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples
 from airtruth.tracing.model.settings import declared_derivatives_of
 from airtruth.units import DEG, G0
@@ -96,12 +96,6 @@ def with_mean_derivatives(records: Sequence[TraceRecord], held: Sequence[str]) -
         return list(records)
     plants = {number: replace(plant, mean_derivatives=mean) for number, plant in plants.items()}
     return [replace(r, plant=plants[id(r.plant)]) for r in records]
-
-
-def flies(aircraft: Aircraft, motion: Motion) -> bool:
-    """Whether the aircraft has a JSBSim model with the controls of a motion."""
-    model = aircraft.file.jsbsim
-    return model is not None and all(getattr(model, control.name) is not None for control in motion.controls)
 
 
 def _with_steady_flight(s: Signals, at: Trim | None) -> Signals:
@@ -281,4 +275,4 @@ def gust_length_m(altitude_m: float, motion: Motion = LONGITUDINAL) -> float:
     return scales.length_w_m if motion is LONGITUDINAL else side_gust(_FIGURES, scales)[1]
 
 
-__all__ = ["condition_notes", "flies", "gust_length_m", "records_of"]
+__all__ = ["condition_notes", "gust_length_m", "records_of"]

@@ -22,10 +22,11 @@ from airtruth.physics.composition import directions
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.physics.resolution import LinearPoint
-from airtruth.tracing.conditions import condition_notes, flies, records_of, with_mean_derivatives
+from airtruth.tracing.conditions import condition_notes, records_of, with_mean_derivatives
 from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses, causes_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
+from airtruth.tracing.model.probed import flies
 from airtruth.tracing.model.reading import measured_controls, read
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine
 from airtruth.tracing.model.settings import (

@@ -25,7 +25,7 @@ from airtruth.importers.guessing.columns import Column, GroupClock
 from airtruth.importers.guessing.readings import Candidates, Reading
 from airtruth.importers.guessing.sides import mixed_with, pair
 from airtruth.importers.guessing.slots import ALL_SLOTS, OPPOSITE, SIGN, SIGNED, SLOT_OF, size_of
-from airtruth.importers.uniform import GAP
+from airtruth.importers.uniform import gaps
 from airtruth.physics.atmosphere import altitude_of_pressure_m
 from airtruth.physics.motion import LATERAL as MOTION
 from airtruth.physics.motion import LONGITUDINAL
@@ -101,12 +101,11 @@ def pauses_of(t_s: Array) -> Array:
 
     Parameters
     ----------
-    t_s : times of all columns, ascending [s].
+    t_s : times of all columns, ascending and each once [s].
     """
-    steps = np.diff(t_s)
-    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    long = np.flatnonzero(steps > max(GAP[0] * usual, GAP[1]))
-    return np.stack([t_s[long + 1], steps[long] - usual], axis=1)
+    found = gaps(t_s)
+    usual = float(np.median(np.diff(t_s))) if found else 0.0
+    return np.array([(end, end - start - usual) for start, end in found]).reshape(-1, 2)
 
 
 def without_pauses(t_s: Array, pauses_s: Array) -> Array:

@@ -37,6 +37,12 @@ _RATES: Final = 7
 """Points of the axis of a rate before its breaks are added [-] (judgement: the forces are nearly linear in it)."""
 
 
+def flies(aircraft: Aircraft, motion: Motion) -> bool:
+    """Whether the aircraft has a JSBSim model with the controls of a motion."""
+    model = aircraft.file.jsbsim
+    return model is not None and all(getattr(model, control.name) is not None for control in motion.controls)
+
+
 def trim_of(
     aircraft: Aircraft,
     airspeed_m_s: float,
@@ -233,4 +239,4 @@ def _of_one_length(axes: Sequence[Array], values: Sequence[Array]) -> list[tuple
     return filled
 
 
-__all__ = ["SPEEDS", "engines", "probed", "probed_lateral", "trim_of", "with_throttle"]
+__all__ = ["SPEEDS", "engines", "flies", "probed", "probed_lateral", "trim_of", "with_throttle"]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.channels import BANK
 from airtruth.checks.airspeed import attitude, low_passed, speeds
+from airtruth.checks.rotation import alpha_gravity
 from airtruth.errors import LogError
 from airtruth.identification.lateral.observation import known_inputs
 from airtruth.identification.lateral_inputs import lateral_inputs
@@ -149,8 +150,7 @@ def read(
 
 def _completed(logged: Mapping[str, Array], t_s: Array, dt_s: float) -> dict[str, Array]:
     """The channels of a run with those that the lateral-directional motion replaces or reconstructs."""
-    batch = Batch(("",), dt_s, t_s[None], {name: np.asarray(x)[None] for name, x in logged.items()})
-    known = known_inputs(batch)
+    known = known_inputs(_alone(logged, t_s, dt_s))
     made = {
         LONGITUDINAL.vane: known.alpha,
         "theta_rad": known.theta,
@@ -164,21 +164,19 @@ def _completed(logged: Mapping[str, Array], t_s: Array, dt_s: float) -> dict[str
     return {name: x[0] for name, x in made.items()} | dict(logged)
 
 
-def _coupling(channels: Mapping[str, Array], t_s: Array, dt_s: float, sub: int, constants: object) -> Array:
-    """(2 + signals, points) see `Signals`; (0, 0) where the lateral motion is negligible.
+def _alone(channels: Mapping[str, Array], t_s: Array, dt_s: float) -> Batch:
+    """One run as a batch."""
+    return Batch(("",), dt_s, t_s[None], {name: np.asarray(x)[None] for name, x in channels.items()})
 
-    Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1.
-    """
-    batch = Batch(
-        ("",), dt_s, t_s[None], {name: np.asarray(x, np.float64)[None] for name, x in channels.items()}
-    )
-    (turn,), (pitch,) = lateral_inputs(batch, constants)
+
+def _coupling(channels: Mapping[str, Array], t_s: Array, dt_s: float, sub: int, constants: object) -> Array:
+    """(2 + signals, points) see `Signals`; (0, 0) where the lateral motion is negligible."""
+    (turn,), (pitch,) = lateral_inputs(_alone(channels, t_s, dt_s), constants)
     if not turn.any():
         return np.zeros((0, 0))
     if BANK in channels:
-        alpha = channels[LONGITUDINAL.vane]
-        upright = np.cos(alpha) * np.cos(attitude(channels, dt_s))
-        turn = turn + G0 * upright * (np.cos(channels[BANK]) - 1.0) / channels["airspeed_m_s"]
+        alpha, theta = channels[LONGITUDINAL.vane], attitude(channels, dt_s)
+        turn = turn + alpha_gravity(alpha, theta, channels[BANK]) / channels["airspeed_m_s"]
     signals = [channels.get(one.channel, np.zeros_like(turn)) for one in LATERAL.signals]
     return np.stack([fine(low_passed(x, dt_s), sub) for x in (turn, pitch, *signals)])
 

@@ -41,25 +41,24 @@ def as_brief_text(answer: TraceAnswer) -> str:
         ),
     ]
     notes = _notes(answer)
-    # the next step is the last block; notes come before it
-    optional = [_errors(answer), _derivatives(answer), *notes, *_causes(answer), _outcome(answer)]
-    reasons = range(2, 2 + sum(_REASON in note for note in answer.notes))
-    # reasons have room first, and the next step has it before notes
-    wanted = [
-        *reasons,
-        0,
-        1,
-        len(optional) - 1,
-        *(k for k in range(2, len(optional) - 1) if k not in reasons),
+    reasons = sum(_REASON in note for note in answer.notes)
+    # (rank in the room, block) in the order of the text: reasons have room first, and the next step has it before other notes
+    ranked = [
+        (1, _errors(answer)),
+        (2, _derivatives(answer)),
+        *((0, note) for note in notes[:reasons]),
+        *((4, note) for note in notes[reasons:]),
+        *((5, block) for block in _causes(answer)),
+        (3, _outcome(answer)),
     ]
     room = MOST_LINES - sum(map(_height, head)) - _height(_more(len(notes)))
     kept: set[int] = set()
-    for k in wanted:
-        if _height(optional[k]) <= room:
+    for k in sorted(range(len(ranked)), key=lambda k: ranked[k][0]):
+        if _height(ranked[k][1]) <= room:
             kept.add(k)
-            room -= _height(optional[k])
-    left_out = len(notes) - sum(2 <= k < 2 + len(notes) for k in kept)
-    blocks = [*head, *(optional[k] for k in sorted(kept)), _more(left_out)]
+            room -= _height(ranked[k][1])
+    left_out = sum(rank in (0, 4) for k, (rank, _) in enumerate(ranked) if k not in kept)
+    blocks = [*head, *(ranked[k][1] for k in sorted(kept)), _more(left_out)]
     return "\n\n".join("\n".join(block) for block in blocks if block)
 
 

@@ -32,7 +32,7 @@ from airtruth.simulation.tracks import Track, substeps
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.increment_response import increments
 from airtruth.tracing.model.plant import LAYOUTS, Plant, looked_up
-from airtruth.tracing.model.probed import probed, trim_of
+from airtruth.tracing.model.probed import flies, probed, trim_of
 from airtruth.tracing.model.records import FINE, Signals
 from airtruth.tracing.model.surface import through
 
@@ -79,13 +79,7 @@ def _beside_lateral(signals: Sequence[Signals], plants: Sequence[Plant]) -> Iter
     trims: dict[int, Trim] = {}
     for s, plant in zip(signals, plants, strict=True):
         at, c = plant.trim, plant.aircraft.constants
-        own = plant.aircraft.file.jsbsim
-        if (
-            not s.coupling.size
-            or at is None
-            or own is None
-            or not all(getattr(own, x.name) for x in LATERAL.controls)
-        ):
+        if at is None or not s.coupling.size or not flies(plant.aircraft, LATERAL):
             yield None
             continue
         if id(at) not in trims:
