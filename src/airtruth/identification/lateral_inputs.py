@@ -25,8 +25,8 @@ _LEAST: Final = 0.02
 """Pitch rate that the lateral motion causes, over that of the record, from which the motion is an input [-]; judgement: below it
 the derivatives move by less than their standard errors in a record."""
 ROLLS: Final = (
-    "Warning: the lateral motion causes part of the pitch rate. Roll, yaw, sideslip and bank are known inputs. The forces in the "
-    "pitch plane by sideslip and by the surfaces of the lateral motion are left out and may bias the estimates; use records of "
+    "Warning: the lateral motion causes part of the pitch rate. Roll, yaw, sideslip and bank are known inputs. The forces "
+    "that sideslip and the lateral surfaces cause in the pitch plane are left out and may bias the estimates; use records of "
     "the longitudinal motion alone, or `airtruth trace`, which has these forces of the JSBSim model"
 )
 """Warning about records in which the lateral motion is an input."""

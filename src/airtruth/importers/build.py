@@ -142,7 +142,7 @@ def sentences(log: FlightLog) -> list[str]:
     if isinstance(how, Mapping) and "missing" in how:
         listed.append(
             f"{int(how['missing'])} samples are missing, and up to {float(how['longest_s']):g} s lie between two: they are "
-            f"by {_METHODS[str(how['method'])]}; cut a [[manoeuvre]] beside them if the surfaces move"
+            f"replaced by {_METHODS[str(how['method'])]}; cut a [[manoeuvre]] beside them if the surfaces move"
         )
     return listed
 

@@ -105,9 +105,9 @@ def row_problems(log: FlightLog) -> Iterator[str]:
 
 
 def _missing(log: FlightLog) -> Iterator[str]:
-    """Channels that the motion lacks of whose channels the log holds the most, the pitch plane if both lack as many.
+    """Channels that the log lacks of the motion that it covers best, the pitch plane if it covers both alike.
 
-    A channel of the pitch plane is missing in a log of the lateral motion too where a column has nearly its name.
+    In a log of the lateral motion, a channel of the pitch plane counts as missing where a column has nearly its name.
     """
     motion = min(MOTIONS.values(), key=lambda m: len({*m.required} - {*log.channels}))
     present = [name for name in log.channels if name not in SIGNALS]

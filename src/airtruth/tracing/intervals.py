@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, ParameterEstimate]:
     """Value, standard deviation and 95 % interval of each parameter of an effect.
 
-    The relative uncertainty of the direction of a cause is one of its size too: all that it moves may be in proportion to another
-    size, such as the lift at a wing tip.
+    The direction of a cause is known to a share of each element (`airtruth.effects.effect.Prior.shape`). Its size is known no
+    better, because all elements may err together.
 
     Parameters
     ----------

@@ -130,7 +130,7 @@ class Writer:
         if r.column.unknown and not r.unit_from:
             return (
                 f"the file states the unit {r.column.unknown!r}, which is not known, and its size fits {r.unit!r}; state unit, "
-                "or scale where it is another one"
+                "and scale if no unit of the list is right"
             )
         if decision.lead >= CERTAIN or (slot == "altitude" and self._harmless(decision)):
             return ""
