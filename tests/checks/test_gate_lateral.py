@@ -152,6 +152,19 @@ def test_every_clean_lateral_log_is_accepted(plane, gust, number):
     assert certain(inspect(log_of(*clean(plane, gust, number)))) == []
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [-0.5, 0.15, 0.3, 0.5, 0.7])
+@pytest.mark.parametrize("plane", PLANES)
+def test_an_arm_of_the_accelerometer_is_no_fault_of_its_sign_or_unit(plane, share):
+    """ay shows the yaw acceleration times the arm, which is a multiple of beta where the rudder rests."""
+    arm_m = share * PLANES[plane].span
+    flights = [
+        replace(f, plane=PLANES[plane], gust=0.5, seed=i).reading("ay_m_s2", x=arm_m)
+        for i, f in enumerate(record_pair())
+    ]
+    assert certain(inspect(log_of(*flights))) == []
+
+
 COMBINED = """schema = 1
 name = "combined"
 title = "Elevator, then aileron and rudder"

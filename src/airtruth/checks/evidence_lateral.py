@@ -25,7 +25,7 @@ from airtruth.checks.lateral_model import driven
 from airtruth.checks.means import mean_test
 from airtruth.checks.relation import Relation, finite
 from airtruth.checks.rotation import banked, given, headed, rates, side_gravity, sideslip_turn
-from airtruth.checks.spectra import regress, spectrum
+from airtruth.checks.spectra import Factors, regress, spectrum
 from airtruth.checks.together import Runs
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.motion_parts import Control
@@ -64,6 +64,10 @@ SIDE_SLOPE: Final = (float(np.log(2.0)), 0.8)
 """Logarithm of the usual slope of -ay on beta [g/rad], and its tolerance: -CYbeta/CL of 0.6 to 6 (judgement)."""
 SIDE_OF_LIFT: Final = (float(np.log(0.16)), 0.6)
 """Logarithm of that slope over the slope of -az on alpha, -CYbeta/CLalpha, and its tolerance: 0.09 to 0.25."""
+AT_RUDDER: Final = (float(np.log(0.6)), 0.3)
+"""Logarithm of the slope with the yaw acceleration held over that with the rudder held, and its tolerance (judgement).
+1 - CYdr Cnbeta/(Cndr CYbeta) is 0.57 to 0.73 for the five aircraft of the tests: the GTM, a transport, a jet, a light and a twin
+aircraft."""
 SIDE_LOAD_STD: Final = 0.25
 """Tolerance of the mean of ay, as a share of gravity [-]: a steady sideslip of 7 deg (judgement)."""
 SIDE_SHARE: Final = 0.5
@@ -140,37 +144,76 @@ def _sideslip(runs: Runs) -> Relation:
 
 
 def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
-    """Slope of ay on beta, the rates and the surfaces held: its sign, and its size against the usual one."""
+    """Slope of ay on beta, the rates and the surfaces held: its sign, and its size against the usual one.
+
+    Where the rudder moves the nose, the yaw acceleration is held and not the rudder. The accelerometer's arm is then a factor of
+    that acceleration and not of beta.
+    """
     channels = (SIDE_FORCE, LATERAL.vane, *LATERAL.gyros, *surfaces)
     if SIDE_FORCE not in runs.channels:
         return _nothing("side_slope", channels[1:], runs)
-    value, std, clear = _slope(runs, channels)
+    factors = _factors(runs, channels)
+    value, std, clear = _slope(factors)
     usual, tolerance = (np.full_like(value, x) for x in SIDE_SLOPE)
     normal = LONGITUDINAL.outputs[-1].channel
     of_alpha = (normal, LONGITUDINAL.vane, *LONGITUDINAL.gyros, *LONGITUDINAL.surfaces)
     if set(of_alpha) <= set(runs.channels):
-        slope, slope_std, clear_slope = _slope(runs, of_alpha)
+        slope, slope_std, clear_slope = _slope(_factors(runs, of_alpha))
         known = clear_slope & (slope > SIGNIFICANT * slope_std)
         usual = np.where(known, np.log(np.where(known, slope, 1.0)) + SIDE_OF_LIFT[0], usual)
         tolerance = np.where(known, SIDE_OF_LIFT[1], tolerance)
+    free, free_std, turns_nose = _without_arm(runs, channels, factors)
+    value, std = np.where(turns_nose, free, value), np.where(turns_nose, free_std, std)
+    usual = usual + AT_RUDDER[0] * turns_nose
+    tolerance = np.hypot(tolerance, AT_RUDDER[1] * turns_nose)
     clear &= np.abs(value) > SIGNIFICANT * std
     against = np.minimum(value, 0.0) / std
     size = np.log(np.maximum(np.abs(value), 1e-9)) - usual
     size = size / np.sqrt(tolerance**2 + (std / value) ** 2)
     distance = finite((against**2 + size**2) * clear)
-    return Relation("side_slope", channels, distance, np.stack([value, std, np.exp(usual)], axis=1), clear)
+    figures = np.stack([value, std, np.exp(usual), turns_nose], axis=1)
+    return Relation("side_slope", channels, distance, figures, clear)
 
 
-def _slope(runs: Runs, channels: tuple[str, ...]) -> tuple[Array, Array, Bools]:
-    """Slope of less the first channel on the second over gravity, the others held; its deviation; whether enough is explained."""
-    factors = regress(runs.spectra_of(channels[0])[:, 0], runs.spectra_of(*channels[1:]), lines=runs.lines())
+def _factors(runs: Runs, channels: tuple[str, ...]) -> Factors:
+    """Factors of the first channel on the others."""
+    return regress(runs.spectra_of(channels[0])[:, 0], runs.spectra_of(*channels[1:]), lines=runs.lines())
+
+
+def _slope(factors: Factors) -> tuple[Array, Array, Bools]:
+    """Less the first factor over gravity, the others held; its deviation; whether enough is explained."""
     std = np.sqrt(factors.covariance[:, 0, 0]) / G0
     return -factors.value[:, 0] / G0, std, factors.share > SIDE_SHARE
 
 
+def _without_arm(runs: Runs, channels: tuple[str, ...], side: Factors) -> tuple[Array, Array, Bools]:
+    """Less the factor of beta in ay over gravity, the yaw acceleration held and not the rudder; its deviation; whether the
+    rudder moves the nose.
+
+    Parameters
+    ----------
+    channels : ay and its causes, beta first; side : factors of ay on them.
+    """
+    yaw = LATERAL.gyros[-1]
+    turning = next((c.channel for c in LATERAL.controls if c.damped == yaw), "")
+    if turning not in channels:
+        none = np.zeros(len(runs) + 1)
+        return none, none, none > 0.0
+    at = channels.index(turning) - 1
+    turn = regress(runs.spectra_of(yaw)[:, 0], runs.integrals_of(*channels[1:]), lines=runs.lines())
+    power, power_var = turn.value[:, at], turn.covariance[:, at, at]
+    known = np.abs(power) > SIGNIFICANT * np.sqrt(power_var)
+    power = np.where(known, power, 1.0)
+    ratio = turn.value[:, 0] / power
+    ratio_var = (turn.covariance[:, 0, 0] + ratio**2 * power_var) / power**2
+    c, of_turning = side.covariance, side.value[:, at]
+    variance = c[:, 0, 0] + ratio**2 * c[:, at, at] - 2.0 * ratio * c[:, 0, at] + of_turning**2 * ratio_var
+    return -(side.value[:, 0] - ratio * of_turning) / G0, np.sqrt(variance) / G0, known
+
+
 def _nothing(name: str, channels: tuple[str, ...], runs: Runs) -> Relation:
     none = np.zeros(len(runs) + 1)
-    return Relation(name, channels, none, np.stack([none, none, none], axis=1), none > 0.0)
+    return Relation(name, channels, none, np.stack([none] * 4, axis=1), none > 0.0)
 
 
 def _surface(runs: Runs, control: Control, surfaces: tuple[str, ...]) -> list[Relation]:

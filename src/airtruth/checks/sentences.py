@@ -71,9 +71,14 @@ def evidence(test: Relation, row: int = -1) -> str:
         return f"the rate of {LATERAL.vane} is {_shares(f)}, where 1 is required of each"
     if test.name == "side_slope":
         side = LATERAL.outputs[-1].channel
+        held, unless = (
+            ("with the yaw acceleration held, ", "")
+            if f[3] > 0.0
+            else ("", ", unless the accelerometer is far ahead of the CG")
+        )
         return (
-            f"{side} changes by {-f[0]:.2g} +- {f[1]:.2g} g per radian of {LATERAL.vane}, where sideslip from the right pushes "
-            f"to the left, usually by about {f[2]:.2g} g, unless the accelerometer is far ahead of the CG"
+            f"{held}{side} changes by {-f[0]:.2g} +- {f[1]:.2g} g per radian of {LATERAL.vane}, where sideslip from the right "
+            f"pushes to the left, usually by about {f[2]:.2g} g{unless}"
         )
     if test.name in TURNS:
         return (
