@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import BANK
-from airtruth.identification.lateral_inputs import lateral_inputs
 from airtruth.identification.options import Options
 from airtruth.identification.regression.rows import row_factors
 from airtruth.identification.signals import ALPHA, AZ, COMMAND, Q
@@ -228,18 +227,18 @@ def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Obs
     smooth = zero_phase(signals, sos)
     condition = flight_condition(batch, constants, options, smooth[:, Q])
     left = left_smooth = NO_LEFT
-    measured, (in_alpha, in_q) = options.pressure == "measured", lateral_inputs(batch, constants)
-    rolls = in_q.any(axis=1, keepdims=True)
-    if measured or rolls.any():
+    measured, known = options.pressure == "measured", batch.known_rates
+    if measured or known is not None:
         across = across_path(batch)
-        if measured:
+        if known is None or measured:
             v, p = ratios_of(batch, constants, condition)
         else:
             v = p = np.ones_like(across)
-            across = np.where(rolls, across, 1.0)
+            across = np.where(np.asarray(known.any(axis=(0, 2)))[:, None], across, 1.0)
         left = divide(signals, v, p, condition.airspeed_m_s, batch.dt_s, across)
-        left[:, 2] -= v / p * in_alpha
-        left[:, 3] -= in_q / p
+        if known is not None:
+            left[:, 2] -= v / p * known[0]
+            left[:, 3] -= known[1] / p
         smooth, left_smooth = zero_phase(signals, sos), zero_phase(left, sos)
     return Observation(
         dt_s=batch.dt_s,

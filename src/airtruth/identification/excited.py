@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.sources import Logs, sources
 from airtruth.logs.store import read_log
 from airtruth.logs.tables import opened
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
+
+Array = NDArray[np.float64]
 
 SHARE: Final = 0.1
 """Motion of a surface over that of the surface that moves most, from which it excites its motion [-] (judgement: a damper or the
@@ -23,17 +26,38 @@ def _surfaces(motion: Motion) -> list[str]:
     return [control.channel for control in motion.controls]
 
 
+def excites(channels: Mapping[str, Array], motion: Motion) -> NDArray[np.bool_]:
+    """Whether a surface of the motion moves by at least `SHARE` of the one that moves most.
+
+    Parameters
+    ----------
+    channels : column name -> (..., samples); a surface that is missing does not move.
+
+    Returns
+    -------
+    (...)
+    """
+    moved = {
+        name: channels[name].std(axis=-1)
+        for m in MOTIONS.values()
+        for name in _surfaces(m)
+        if name in channels
+    }
+    own = [moved[name] for name in _surfaces(motion) if name in moved]
+    if not own:
+        return np.zeros(next(iter(channels.values())).shape[:-1], dtype=np.bool_)
+    most = np.max(own, axis=0)
+    return np.asarray((most > 0.0) & (most >= SHARE * np.max(list(moved.values()), axis=0)))
+
+
 def excited_runs(log: FlightLog, motion: Motion) -> list[str]:
-    """Runs of which a surface of the motion moves by at least `SHARE` of the one that moves most."""
+    """Runs that excite the motion, see `excites`."""
     surfaces = [name for m in MOTIONS.values() for name in _surfaces(m) if name in log.channels]
-    found = []
-    for run, run_id in enumerate(log.run_ids):
-        rows = log.rows(run)
-        moved = {name: float(np.std(log.channels[name][rows])) for name in surfaces}
-        own = max((moved.get(name, 0.0) for name in _surfaces(motion)), default=0.0)
-        if own > 0.0 and own >= SHARE * max(moved.values()):
-            found.append(run_id)
-    return found
+    return [
+        run_id
+        for run, run_id in enumerate(log.run_ids)
+        if surfaces and excites({name: log.channels[name][log.rows(run)] for name in surfaces}, motion)
+    ]
 
 
 def _channels(source: Path | FlightLog) -> Collection[str]:
@@ -70,4 +94,4 @@ def excited_motions(logs: Logs) -> tuple[Motion, ...]:
     return tuple(m for m in MOTIONS.values() if m.name in found) or (LONGITUDINAL,)
 
 
-__all__ = ["SHARE", "excited_motions", "excited_runs"]
+__all__ = ["SHARE", "excited_motions", "excited_runs", "excites"]

@@ -24,7 +24,7 @@ from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.excited import excited_runs
 from airtruth.identification.lateral.methods import curvature_of
 from airtruth.identification.lateral.observation import assumed
-from airtruth.identification.lateral_inputs import ROLLS, lateral_inputs
+from airtruth.identification.lateral_inputs import ROLLS, beside_lateral
 from airtruth.identification.methods import Method
 from airtruth.identification.options import Options
 from airtruth.identification.record_constants import EqualRuns, differing, with_constants
@@ -155,8 +155,10 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         ]
         if task.motion is LATERAL:
             found.curved = curvature_of(parts, task.options)
-        elif any(lateral_inputs(p.batch, p.constants)[1].any() for p in parts):
-            found.notes.append(ROLLS)
+        else:
+            parts = [replace(p, batch=beside_lateral(p.batch, p.constants, task.options)) for p in parts]
+            if any(p.batch.known_rates is not None for p in parts):
+                found.notes.append(ROLLS)
         for part in parts:
             found.dt_s = max(found.dt_s, part.batch.dt_s)
             if task.motion is LONGITUDINAL and len(found.measures) < poor.MOST_RUNS:

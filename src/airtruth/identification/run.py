@@ -272,7 +272,7 @@ class _Work:
         if found.estimates:
             self.keep([found.estimates[chosen.name] for chosen in self.methods])
         self.parts += found.parts
-        self.notes += found.notes
+        self.notes += [note for note in found.notes if note not in self.notes]
         self.forced += found.forced
         self.dt_s = max(self.dt_s, found.dt_s)
         self.noisy += found.noisy

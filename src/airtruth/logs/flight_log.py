@@ -306,6 +306,7 @@ class Batch:
     t_s : (runs, samples) time [s].
     channels : column name -> (runs, samples) values in SI, C-contiguous.
     servo_s : time constant of the elevator's servo, where the aircraft declares it [s]; 0 for none.
+    known_rates : (2, runs, samples) parts of alpha' [rad/s] and q' [rad/s2] that another motion causes; None for none.
     """
 
     run_ids: tuple[str, ...]
@@ -313,6 +314,7 @@ class Batch:
     t_s: Array
     channels: Mapping[str, Array]
     servo_s: float = 0.0
+    known_rates: Array | None = None
 
 
 def batches(log: FlightLog) -> Iterator[Batch]:

@@ -36,7 +36,12 @@ from airtruth.identification.likelihood.predictor import (
     layout,
     short_period,
 )
-from airtruth.identification.likelihood.pressure import products, with_pressure, with_trim_moment
+from airtruth.identification.likelihood.pressure import (
+    products,
+    with_known_rates,
+    with_pressure,
+    with_trim_moment,
+)
 from airtruth.identification.likelihood.scoring import Maxima, Scored, Search, maximise
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
@@ -85,10 +90,12 @@ def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) 
     predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
     u, bend = u[:, :, None], bend[:, :, None]
     if options.pressure == "measured":
-        more = products(batch, constants, scale)
-        servo = np.zeros_like(more)
-        u, bend = np.concatenate([u, more], axis=2), np.concatenate([bend, servo], axis=2)
-        predictor = with_pressure(predictor, scale, batch, constants, more.shape[2])
+        u = np.concatenate([u, products(batch, constants, scale)], axis=2)
+        predictor = with_pressure(predictor, scale, batch, constants)
+    if batch.known_rates is not None:
+        u = np.concatenate([u, np.moveaxis(batch.known_rates, 0, 2)], axis=2)
+        predictor = with_known_rates(predictor)
+    bend = np.concatenate([bend, np.zeros_like(u[:, :, 1:])], axis=2)
     if options.moment_noise > 0.0:
         noise = (MOMENT_NOISE,)
         predictor = extended(predictor, [Term("Q", "q", "", 1.0, noise * 2)], (), (), noise, noise)

@@ -5,7 +5,7 @@ of eqs (2), (3) act on alpha and the elevator p times, on the rate p/v times; th
 1/v of that. The surplus over the reference, such as (p - 1) alpha, is made of measured signals and enters
 like the elevator; its noise is that of the sensors times a few percent. Filter and gain stay those of the
 reference condition. Gravity across a path that turns, (g/V) cos(gamma), is a known input as well, and in records of both
-motions the lateral one (`airtruth.identification.lateral_inputs`). Left out is
+motions the rates that the lateral one causes (`with_known_rates`). Left out is
 gamma V'/V, by which a changing airspeed turns a path that is not level.
 
 Source: M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2), (3).
@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants, across_path, ratios_of
-from airtruth.identification.lateral_inputs import lateral_inputs
 from airtruth.identification.likelihood.predictor import AIRSPEED, Predictor, Term, actions, extended
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.motion import LONGITUDINAL
@@ -40,12 +39,12 @@ GRAVITY: Final = "gravity"
 """Change of gravity across the path."""
 INPUTS: Final = (*TURNING, TRIM[0], *SURPLUS, TRIM[1], GRAVITY)
 """Inputs of every record."""
-LATERAL_INPUTS: Final = ("lateral_alpha", "lateral_q")
-"""Parts of alpha_dot and q_dot that the lateral motion causes, in records of both motions."""
+KNOWN: Final = tuple(f"known_{state.name}" for state in LONGITUDINAL.states)
+"""Parts of the rates of the states that another motion causes."""
 
 
 def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
-    """Inputs `INPUTS`, and `LATERAL_INPUTS` where a run has lateral motion, (runs, samples, inputs).
+    """Inputs `INPUTS`, (runs, samples, inputs).
 
     The signals are taken relative to their means over the record, to which the lift at
     p = 1 in `with_pressure` belongs.
@@ -64,15 +63,12 @@ def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
         surplus.append((force if signal.length is None else path) * moved)
     across = across_path(batch)
     gravity = (across - across.mean(axis=1, keepdims=True)) / v
-    lateral = lateral_inputs(batch, constants)
     trim = force / v  # the weight turns the path by 1/v too
-    return np.stack(
-        [*turning, trim, *surplus, force, gravity, *(lateral if lateral[1].any() else ())], axis=2
-    )
+    return np.stack([*turning, trim, *surplus, force, gravity], axis=2)
 
 
 def with_pressure(
-    predictor: Predictor, scale: Scale, batch: Batch, constants: AircraftConstants, count: int
+    predictor: Predictor, scale: Scale, batch: Batch, constants: AircraftConstants
 ) -> Predictor:
     """The predictor of the short period with the inputs that `products` makes.
 
@@ -80,7 +76,7 @@ def with_pressure(
     ----------
     predictor : of `airtruth.identification.likelihood.predictor.short_period`. With airspeed among its outputs the lift of
         the trim follows the gust u; without, it follows the measured airspeed, and u is the part that this does not show.
-    scale, batch, constants : as in `products`; count : number of inputs that it made.
+    scale, batch, constants : as in `products`.
     """
     flow, normal = LONGITUDINAL.flow, LONGITUDINAL.outputs[-1]
     terms = [Term("B", flow, GRAVITY, G0 / scale.airspeed_m_s)]
@@ -94,12 +90,13 @@ def with_pressure(
             Term("B", flow, TRIM[0], steady / scale.airspeed_m_s),
             Term("D", normal.name, TRIM[1], steady),
         ]
-    names = (*INPUTS, *LATERAL_INPUTS)[:count]
-    terms += [
-        Term("B", state.name, name, 1.0)
-        for state, name in zip(LONGITUDINAL.states, names[len(INPUTS) :], strict=False)
-    ]
-    return extended(predictor, terms, inputs=names)
+    return extended(predictor, terms, inputs=INPUTS)
+
+
+def with_known_rates(predictor: Predictor) -> Predictor:
+    """The predictor with the inputs `KNOWN`, the rates of `airtruth.logs.flight_log.Batch`."""
+    terms = [Term("B", state.name, name, 1.0) for state, name in zip(LONGITUDINAL.states, KNOWN, strict=True)]
+    return extended(predictor, terms, inputs=KNOWN)
 
 
 def with_trim_moment(predictor: Predictor, scale: Scale) -> Predictor:

@@ -84,8 +84,9 @@ def records(batch: Batch, constants: AircraftConstants, options: Options) -> Ref
     )
     bend = servo_bend(signals[:, ELEVATOR], declared_decay=decay_of(batch.servo_s, batch.dt_s))
     signals = signals - origin_of(signals, observation.window)[:, :, None]
+    known = np.zeros_like(v) if batch.known_rates is None else batch.known_rates[1]
     runs = tuple(
-        RefinedRun(signals[r], smooth[r], bend[r], v[r], p[r], observation.factors[r], batch.dt_s)
+        RefinedRun(signals[r], smooth[r], bend[r], v[r], p[r], observation.factors[r], batch.dt_s, known[r])
         for r in range(signals.shape[0])
     )
     return RefinedRecords(runs, observation.scale)

@@ -51,6 +51,7 @@ class RefinedRun(NamedTuple):
     v, p : (samples,) measured airspeed and dynamic pressure over those of the flight condition [-].
     factors : (4,) from `airtruth.identification.regression.rows.row_factors`.
     dt_s : sample period [s].
+    known : (samples,) part of q' that another motion causes [rad/s2].
     """
 
     signals: Array
@@ -60,6 +61,7 @@ class RefinedRun(NamedTuple):
     p: Array
     factors: Array
     dt_s: float
+    known: Array
 
 
 @njit(cache=True)
@@ -321,8 +323,10 @@ def record_sums(
     lag(p, pole, nothing, dt_s, columns[0])
     columns[1] = np.exp(pole * dt_s * np.arange(samples))
     y[:] = q - q[0] * columns[1] + pole * rate
-    # q as alpha and the elevator move it, with the constant and the initial value that fit it best
-    made = moment * (theta[CM_ALPHA] * x_alpha + theta[CM_DE] * x_de)
+    lag(record.known, pole, nothing, dt_s, rate)
+    y -= rate
+    # q as alpha, the elevator and the known part move it, with the constant and the initial value that fit it best
+    made = moment * (theta[CM_ALPHA] * x_alpha + theta[CM_DE] * x_de) + rate
     own = columns.copy() if intercept else columns[1:].copy()
     rest = np.empty((1, samples))
     rest[0] = q - made

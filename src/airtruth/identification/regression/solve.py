@@ -146,6 +146,7 @@ def chunks(batch: Batch) -> Iterator[Batch]:
             run_ids=batch.run_ids[part],
             t_s=batch.t_s[part],
             channels={name: values[part] for name, values in batch.channels.items()},
+            known_rates=None if batch.known_rates is None else batch.known_rates[:, part],
         )
 
 

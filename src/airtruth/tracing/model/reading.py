@@ -16,7 +16,7 @@ from airtruth.checks.airspeed import attitude, low_passed, speeds
 from airtruth.checks.rotation import alpha_gravity
 from airtruth.errors import LogError
 from airtruth.identification.lateral.observation import known_inputs
-from airtruth.identification.lateral_inputs import lateral_inputs
+from airtruth.identification.lateral_inputs import lateral_rates
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.numerics.whiteness import is_white, noise_at_rest
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
@@ -171,7 +171,7 @@ def _alone(channels: Mapping[str, Array], t_s: Array, dt_s: float) -> Batch:
 
 def _coupling(channels: Mapping[str, Array], t_s: Array, dt_s: float, sub: int, constants: object) -> Array:
     """(2 + signals, points) see `Signals`; (0, 0) where the lateral motion is negligible."""
-    (turn,), (pitch,) = lateral_inputs(_alone(channels, t_s, dt_s), constants)
+    (turn,), (pitch,) = lateral_rates(_alone(channels, t_s, dt_s), constants)
     if not turn.any():
         return np.zeros((0, 0))
     if BANK in channels:
