@@ -7,13 +7,17 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.logs.store import read_log
+from airtruth.physics.linear_model import Linear
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing import TraceOptions
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.model.reading import MeasuredControl, read
+from airtruth.tracing.model.reading import MeasuredControl, measured_controls, read
+from airtruth.tracing.model.surface_noise import caused_share, gains
 from airtruth.tracing.prepare import prepare
 from airtruth.units import DEG
 from validation import small_aircraft as small
+from validation.lateral_declared import lateral_aircraft
+from validation.lateral_truth import log_of, trial
 
 STD_RAD = 0.04 * DEG
 
@@ -54,15 +58,38 @@ def test_the_noise_of_an_undeclared_surface_is_that_of_its_rest():
 
 
 @pytest.mark.slow
-def test_it_counts_where_it_turns_the_aircraft_as_much_as_the_gyro_shows(plane):
-    """0.04 deg changes the pitch rate of the small aircraft by 0.34 of the gyro's noise in a sample, and that of the GTM at
-    0.01 deg by 0.02.
+def test_it_counts_where_the_motion_adds_it_up(plane, tmp_path):
+    """0.04 deg counts for the small aircraft. Of 0.01 deg the GTM adds up 0.96 of the noise of the bank's sensor in the lateral
+    motion, and 0.13 of that of the vane in the pitch plane, which is negligible.
     """
     small_case = prepare([small.flight_log(5)], plane, [], TraceOptions())
     assert all(r.signals.surface_noise_rad2.any() for r in small_case.fitted.records)
-    log = read_log("data/undeclared/f.parquet")
-    gtm = prepare([log], aircraft.load("gtm"), [], TraceOptions())
-    assert all(r.signals.surface_noise_rad2.size == 0 for r in gtm.fitted.records)
+    log, gtm = read_log("data/undeclared/f.parquet"), aircraft.load("gtm")
+    pitch = prepare([log], gtm, [], TraceOptions())
+    assert all(r.signals.surface_noise_rad2.size == 0 for r in pitch.fitted.records)
+    (signals, *_) = read(log, LONGITUDINAL, measured_controls(gtm, LONGITUDINAL), gtm.constants)
+    noisy = replace(pitch.fitted.records[0], signals=signals)
+    assert caused_share(noisy, pitch.fitted.settings) == pytest.approx(0.134, abs=0.002)
+    hidden = trial("lateral-none", 7200004)
+    declared = aircraft.load(lateral_aircraft(tmp_path / "declared"))
+    lateral = prepare([log_of(*hidden.flights)], declared, [], TraceOptions(motion="lateral"))
+    for record in lateral.fitted.records:
+        assert (record.signals.surface_noise_rad2 > 0.0).any(axis=1).all()
+        assert caused_share(record, lateral.fitted.settings) == pytest.approx(0.96, abs=0.01)
+
+
+def test_gains_are_those_of_the_transfer_function():
+    """x'' + 2 zeta w x' + w^2 x = b u at s = j w: x = b/(2 j zeta w^2), x' = b/(2 zeta w), by hand."""
+    w, zeta, b = 5.0, 0.15, 3.0
+    model = Linear(
+        a=np.array([[0.0, 1.0], [-(w**2), -2.0 * zeta * w]]),
+        b=np.array([[0.0], [b]]),
+        c=np.eye(2),
+        d=np.zeros((2, 1)),
+    )
+    for gain in gains(model, 0.5):
+        assert gain[:, 0] == pytest.approx([b / (2j * zeta * w**2), b / (2.0 * zeta * w)], rel=1e-12)
+    assert not gains(model, 6.0)
 
 
 @pytest.mark.slow

@@ -25,6 +25,7 @@ from airtruth.identification.record_constants import LateralValues, values_of
 from airtruth.physics import short_period
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.lateral import LateralScale, lateral_scale, lateral_system, structure
+from airtruth.physics.linear_model import Linear, Structure
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.terms import AeroTerm, term_value
 
@@ -68,6 +69,13 @@ def linear_scale(
     return lateral_scale(values, airspeed, density, alpha, theta)
 
 
+def linear_motion(derivatives: Array, scale: short_period.Scale | LateralScale) -> tuple[Linear, Structure]:
+    """The linear model of derivatives (..., derivatives) and its structure, at a scale (...) whose type decides the motion."""
+    if isinstance(scale, LateralScale):
+        return lateral_system(derivatives, scale), structure(scale)
+    return short_period.linear_system(derivatives, scale), short_period.structure(scale)
+
+
 def response(
     derivatives: Array, scale: short_period.Scale | LateralScale, coefficients: Array, dt_s: float
 ) -> Array:
@@ -86,10 +94,7 @@ def response(
     """
     runs = coefficients.shape[1]
     every = np.broadcast_to(derivatives, (runs, derivatives.shape[-1]))
-    if isinstance(scale, LateralScale):
-        system, own = lateral_system(every, scale), structure(scale)
-    else:
-        system, own = short_period.linear_system(every, scale), short_period.structure(scale)
+    system, own = linear_motion(every, scale)
     u = np.einsum("rij,jrn->rni", own.forces, coefficients)
     x = _driven(system.a, u, dt_s)
     read = np.einsum("rij,rnj->irn", system.c, x)
@@ -116,4 +121,4 @@ def _driven(a: Array, u: Array, dt_s: float) -> Array:
     return x
 
 
-__all__ = ["increments", "linear_scale", "response"]
+__all__ = ["increments", "linear_motion", "linear_scale", "response"]
