@@ -272,10 +272,12 @@ class _BestFirst:
         return self._told[at]
 
     def _following(self, best: EvaluatedSet) -> EvaluatedSet | None:
-        """The set to refit next: the best one under the prior of its own derivatives, the best without a refit, and at last the
-        simplest one that an answer can state, and those of one effect less: far from its fit a quadratic predicts badly."""
-        if self._wants(best):
-            return best
+        """The set to refit next: the best one under the prior of its own derivatives, those of one effect less, the best without
+        a refit, and at last the simplest one that an answer can state, and those of one effect less. Far from its fit a quadratic
+        predicts badly: it does not show that one of two effects that cancel each other is enough."""
+        first = next((p for p in (best, *self._smaller(best)) if self._wants(p)), None)
+        if first is not None:
+            return first
         left = [p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p)]
         least = best.weighed.log_evidence + float(np.log(CRITERION.level))
         scales = {id(x): self._scale(x) for x in self._expansions}
