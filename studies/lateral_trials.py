@@ -13,6 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from airtruth.errors import LogError
 from airtruth.tracing import TraceOptions
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.criterion import CRITERION
@@ -49,13 +50,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, required=True, help="of the first trial; the others follow")
     parser.add_argument("--count", type=int, default=10)
     chosen = parser.parse_args()
-    named = reported = first = sure = 0
+    named = reported = first = sure = refused = 0
     with tempfile.TemporaryDirectory() as folder:
         plane = lateral_aircraft(Path(folder) / "declared")
         for seed in range(chosen.seed, chosen.seed + chosen.count):
             hidden, before = trial(chosen.mode, seed), time.process_time()
-            answer = trace([log_of(*hidden.flights)], plane, TraceOptions(motion="lateral")).answer
             truth = ", ".join(f"{key} {size:.4g}" for key, size in hidden.effects.items()) or "none"
+            try:
+                answer = trace([log_of(*hidden.flights)], plane, TraceOptions(motion="lateral")).answer
+            except LogError as error:
+                print(f"{seed} {truth} -> refused: {error}", flush=True)
+                refused += 1
+                continue
             spent = time.process_time() - before
             print(f"{seed} {truth} -> {described(answer)} [{spent:.0f} s of CPU]", flush=True)
             named += bool(answer.effects)
@@ -65,7 +71,8 @@ def main() -> None:
             sure += bool(answer.effects) and not right and not answer.provisional
     print(
         f"{chosen.mode}, {chosen.count} trials from seed {chosen.seed}: {named} with a name, {reported} with every cause in "
-        f"the reported sets, {first} with exactly the causes first, {sure} with other names and no reservation"
+        f"the reported sets, {first} with exactly the causes first, {sure} with other names and no reservation, "
+        f"{refused} refused by the gate"
     )
 
 
