@@ -34,7 +34,13 @@ from airtruth.tracing.learning.increment_fit import (
     effective_bends,
     is_apart_from_zero,
 )
-from airtruth.tracing.learning.increments import log_evidences, screen, shapes, sharpened
+from airtruth.tracing.learning.increments import (
+    log_evidences,
+    posterior_bends,
+    screen,
+    shapes,
+    sharpened,
+)
 from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.presentation.text import increment_words
@@ -53,6 +59,24 @@ def test_evidence_is_that_of_a_linear_model():
         for s in stds
     ]
     np.testing.assert_allclose(log_evidences(-x.T @ y, x.T @ x, stds), expected, rtol=1e-9)
+
+
+def test_bends_are_those_of_a_linear_model():
+    """Ridge regression, solved by the rows of the prior appended to those of the data."""
+    rng = np.random.default_rng(4)
+    x, y, std = rng.normal(size=(40, 3)), rng.normal(size=40), 0.3
+    expected, *_ = np.linalg.lstsq(np.vstack([x, np.eye(3) / std]), np.append(y, np.zeros(3)), rcond=None)
+    bends, covariance = posterior_bends(-x.T @ y, x.T @ x, std)
+    np.testing.assert_allclose(bends, expected, rtol=1e-10)
+    np.testing.assert_allclose(covariance @ (x.T @ x + np.eye(3) / std**2), np.eye(3), atol=1e-10)
+
+
+def test_bends_of_an_information_that_is_rounding_are_finite():
+    """Two directions that differ by rounding: the smaller eigenvalue may be negative and equal to less the prior's precision."""
+    std = 0.1
+    information = np.diag([1e20, -1.0 / std**2])
+    bends, _ = posterior_bends(np.array([1e10, 1.0]), information, std)
+    np.testing.assert_allclose(bends, [-1e-10, -(std**2)], rtol=1e-12)
 
 
 def test_the_prior_of_a_size_enters_cost_gradient_and_information():

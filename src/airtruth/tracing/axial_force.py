@@ -37,7 +37,7 @@ from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.learning.increment_fit import LEAST_ODDS, effective_bends, is_apart_from_zero
-from airtruth.tracing.learning.increments import CELLS, best_prior, covered
+from airtruth.tracing.learning.increments import CELLS, best_prior, covered, posterior_bends
 from airtruth.tracing.learning.learn import LEAST_RECORDS
 from airtruth.tracing.model.plant import FLOW
 from airtruth.tracing.prepare import Case
@@ -184,13 +184,13 @@ def _learned(fitted: Sequence[AxialSeries], shapes: Sequence[Shape]) -> list[_Le
         bases = _bases(fitted, shape)
         gradient, information = _normal(records, bases, weights)
         std, evidence = best_prior(effect, gradient, information)
-        bends, inverse = _estimate(gradient, information, std)
+        bends, inverse = posterior_bends(gradient, information, std)
         excess = _excess(records, bases, weights, bends, inverse)
         gain = 0.0
         for i in range(len(records)):
             rest = [k for k in range(len(records)) if k != i]
             without = _normal([records[k] for k in rest], [bases[k] for k in rest], weights[rest])
-            b, _ = _estimate(*without, std)
+            b, _ = posterior_bends(*without, std)
             gain += _gain(records[i].y, bases[i] @ b, float(weights[i]))
         found.append(
             _Learned(
@@ -272,12 +272,6 @@ def _gain(y: Array, more: Array, weight: float) -> float:
 def _squares(records: Sequence[_Means], weights: Array) -> float:
     """Gain in log L of all records if nothing beyond their constants were left."""
     return sum(_gain(r.y, r.y, float(w)) for r, w in zip(records, weights, strict=True))
-
-
-def _estimate(gradient: Array, information: Array, std: float) -> tuple[Array, Array]:
-    """Bends (n,) and the inverse of their posterior information (n, n)."""
-    inverse = np.asarray(np.linalg.inv(information + np.eye(len(gradient)) / std**2), dtype=np.float64)
-    return -inverse @ gradient, inverse
 
 
 def _excess(

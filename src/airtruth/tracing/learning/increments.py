@@ -286,8 +286,7 @@ def screen(
         if not np.isfinite(h).all() or not np.trace(h) > 0.0:
             continue
         best, mean = best_prior(e, g, h)
-        start = -np.linalg.solve(h + np.eye(e.bends) / best**2, g)
-        found.append(Screened(e.with_prior(best), mean, np.asarray(start, dtype=np.float64)))
+        found.append(Screened(e.with_prior(best), mean, posterior_bends(g, h, best)[0]))
     return sorted(found, key=lambda s: -s.log_evidence)
 
 
@@ -346,11 +345,29 @@ def log_evidences(gradient: Array, information: Array, stds: Array) -> Array:
     -------
     (priors,) [-].
     """
-    values, vectors = np.linalg.eigh(0.5 * (information + information.T))
-    values, g = np.maximum(values, 0.0), vectors.T @ gradient
+    values, vectors = _directions(information)
+    g = vectors.T @ gradient
     spread = 1.0 + np.outer(stds**2, values)
     gain = (g**2 * stds[:, None] ** 2 / spread).sum(axis=1)
     return np.asarray(0.5 * gain - 0.5 * np.log(spread).sum(axis=1))
+
+
+def posterior_bends(gradient: Array, information: Array, std: float) -> tuple[Array, Array]:
+    """The most probable bends (bends,), -(H + 1/s^2)^-1 g, and their covariance (bends, bends), (H + 1/s^2)^-1.
+
+    Parameters
+    ----------
+    gradient, information : as of `log_evidences`; std : standard deviation of the bends' prior, s.
+    """
+    values, vectors = _directions(information)
+    covariance = np.asarray((vectors / (values + 1.0 / std**2)) @ vectors.T)
+    return -covariance @ gradient, covariance
+
+
+def _directions(information: Array) -> tuple[Array, Array]:
+    """Information of independent directions and these as columns; what rounding made negative is none."""
+    values, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    return np.maximum(values, 0.0), vectors
 
 
 __all__ = [
@@ -359,6 +376,7 @@ __all__ = [
     "best_prior",
     "covered",
     "log_evidences",
+    "posterior_bends",
     "screen",
     "shapes",
     "sharpened",

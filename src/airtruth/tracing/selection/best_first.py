@@ -27,20 +27,15 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.expansion import Expansion, expanded
 from airtruth.tracing.selection.explanation import simplest
 from airtruth.tracing.selection.posterior import EvaluatedSet, Names, Posterior, normalised
+from airtruth.tracing.selection.predictions import LARGEST, Predictions
 from airtruth.tracing.selection.predictive import Soundness
 from airtruth.tracing.selection.set_table import SAME, SetTable
 
 REFITS: Final = 30
 """Largest number of refits [-] (judgement: ten to forty seconds)."""
-MOST_EFFECTS: Final = 3
-"""Number of effects up to which a quadratic predicts every set; larger ones grow from its fit [-] (judgement: computing time)."""
-_LARGEST: Final = 4
-"""Largest number of effects of a set [-] (judgement: more in a few records have not been separable)."""
 _HELD: Final = 1e-4
 """Variance of derivatives that are held as they are declared, over the declared one [-] (judgement: a hundredth of a standard
 deviation)."""
-_SCALE: Final = 2.0
-"""Largest gain over the predicted one that is allowed for [-] (judgement: a quadratic that errs by more tells nothing)."""
 
 
 def best_first(
@@ -84,15 +79,12 @@ class _BestFirst:
         held = {e.key for e in effects if e.quantity not in scaled}
         self.sets, self.null, self.hypothesis = sets, null, null.hypothesis
         self.effects, self.advance = effects, advance
-        self.causes = tuple(c for c in declared.causes if c.key not in held)
-        self.wrong_allowed = declared.wrong_allowed
+        causes = tuple(c for c in declared.causes if c.key not in held)
+        self.told = Predictions(sets, causes, declared.wrong_allowed)
         self.is_sound = Soundness(sets.problem, null)
-        self.temper, self.refits = 1.0, 1
+        self.refits = 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
         self._read: dict[tuple[int, float], list[EvaluatedSet]] = {}
-        self._expansions: list[Expansion] = []
-        self._told: dict[tuple[int, float], dict[frozenset[str], EvaluatedSet]] = {}
-        self._predicted: dict[frozenset[str], EvaluatedSet] = {}
         self._refused: list[PosteriorFit] = []
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
 
@@ -106,7 +98,7 @@ class _BestFirst:
         self._reweighed()
         as_declared = self._as_declared()
         if as_declared is not None:
-            self._expansions.append(expanded(self.sets.problem, as_declared, self.effects))
+            self.told.add(expanded(self.sets.problem, as_declared, self.effects))
         self._tempered(null)
         self._predict(null)
         measured: list[PosteriorFit] = [null]
@@ -137,15 +129,14 @@ class _BestFirst:
                 break
             self._refit(following)
         logs, evaluated = self._evidence()
-        fits = {
-            key: min((e.last for e in every), key=lambda f: (f.hypothesis.spread is not None, f.cost))
-            for key, every in self._fits.items()
-        }
-        return Posterior(normalised(logs), evaluated, fits, null, self.refits, self.temper, self.is_sound)
+        fits = {key: _first(every) for key, every in self._fits.items()}
+        return Posterior(
+            normalised(logs), evaluated, fits, null, self.refits, self.told.temper, self.is_sound
+        )
 
     def _reweighed(self) -> bool:
         """Weigh the kinematics by the present ratio of variances; whether fits were made again for it."""
-        if not self.sets.weigh_kinematics(self.temper):
+        if not self.sets.weigh_kinematics(self.told.temper):
             return False
         least = self._best().weighed.log_evidence + float(np.log(CRITERION.level))
         near = [k for k in self._fits if any(p.weighed.log_evidence > least for p in self._of_fit(k))]
@@ -154,7 +145,7 @@ class _BestFirst:
             for last in [expansion.last for expansion in self._fits.pop(key)]:
                 self._enter(self.sets.converged(last.hypothesis, last.point, near=last))
                 self.refits += 1
-        self._predicted = self._predictions()
+        self.told.combine()
         return bool(changed)
 
     def _begin_at(self, known: Mapping[str, float]) -> None:
@@ -208,10 +199,10 @@ class _BestFirst:
         layout = fitted.layout
         rows = np.r_[layout.of.common.derivatives, layout.sizes]
         temper = float(np.mean(ratio[rows] ** 2))
-        if abs(np.log(temper / self.temper)) < SAME:
+        if abs(np.log(temper / self.told.temper)) < SAME:
             return False
-        self.temper = temper
-        self._predicted = self._predictions()
+        self.told.temper = temper
+        self.told.combine()
         return True
 
     def _best(self) -> EvaluatedSet:
@@ -224,10 +215,10 @@ class _BestFirst:
         """The sets with some effects of the filter that their fits weigh: with each explanation of the derivatives."""
         found: list[EvaluatedSet] = []
         for expansion in self._fits[key]:
-            at = id(expansion), self.temper
+            at = id(expansion), self.told.temper
             if at not in self._read:
-                q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
-                every = q.sets(min(_LARGEST, len(key) + 1) + 1)
+                q = self.told.quadratic(expansion)
+                every = q.sets(min(LARGEST, len(key) + 1) + 1)
                 own = (w for w in every if q.in_filter(w) == key)
                 self._read[at] = [EvaluatedSet(expansion, q, w) for w in own]
             found += self._read[at]
@@ -243,33 +234,7 @@ class _BestFirst:
 
     def _predict(self, fitted: PosteriorFit) -> None:
         """Enter the quadratic about a fit among those that predict the other sets."""
-        self._expansions.append(expanded(self.sets.problem, fitted, self.effects))
-        self._predicted = self._predictions()
-
-    def _predictions(self) -> dict[frozenset[str], EvaluatedSet]:
-        """The sets by their effects of the filter, each as the quadratic predicts it whose fit differs from it by the fewest
-        effects; the better of two."""
-        told = [
-            (frozenset(e.key for e in x.last.hypothesis.effects), self._told_by(x)) for x in self._expansions
-        ]
-        found: dict[frozenset[str], EvaluatedSet] = {}
-        for key in dict.fromkeys(key for _, every in told for key in every):
-            nearest = min(len(own ^ key) for own, _ in told)
-            by_nearest = (every.get(key) for own, every in told if len(own ^ key) == nearest)
-            known = [p for p in by_nearest if p is not None]
-            if known:
-                found[key] = max(known, key=lambda p: p.weighed.log_evidence)
-        return found
-
-    def _told_by(self, expansion: Expansion) -> dict[frozenset[str], EvaluatedSet]:
-        at = id(expansion), self.temper
-        if at not in self._told:
-            q = expansion.quadratic(self.sets.problem, self.causes, self.temper, self.wrong_allowed)
-            own = range(len(expansion.last.hypothesis.effects))
-            every = q.sets(MOST_EFFECTS) + (q.grown(own) if MOST_EFFECTS <= len(own) < _LARGEST else [])
-            every.sort(key=lambda w: w.log_evidence)
-            self._told[at] = {q.in_filter(w): EvaluatedSet(expansion, q, w) for w in every}
-        return self._told[at]
+        self.told.add(expanded(self.sets.problem, fitted, self.effects))
 
     def _following(self, best: EvaluatedSet) -> EvaluatedSet | None:
         """The set to refit next: the best one under the prior of its own derivatives, those of one effect less, the best without
@@ -278,40 +243,22 @@ class _BestFirst:
         first = next((p for p in (best, *self._smaller(best)) if self._wants(p)), None)
         if first is not None:
             return first
-        left = [p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p)]
+        left = [p for key, p in self.told.by_effects.items() if key not in self._fits and self._is_new(p)]
         least = best.weighed.log_evidence + float(np.log(CRITERION.level))
-        scales = {id(x): self._scale(x) for x in self._expansions}
-        within = {k: e for k, p in enumerate(left) if (e := self._expected(p, scales)) > least}
-        if within:
-            return left[max(within, key=lambda k: within[k])]
+        refitted = {
+            k: max(p.weighed.log_evidence for p in every) for k in self._fits if (every := self._of_fit(k))
+        }
+        expected = self.told.expected(left, refitted)
+        if expected and max(expected) > least:
+            following = left[int(np.argmax(expected))]
+            nearer = self.told.nearer(following, self._fits)
+            if nearer is None:
+                return following
+            self._predict(_first(self._fits[nearer]))
+            return self._following(best)
         logs, evaluated = self._evidence()
         answer = evaluated[simplest(normalised(logs))]
         return next((p for p in (answer, *self._smaller(answer)) if self._wants(p)), None)
-
-    def _scale(self, expansion: Expansion) -> float:
-        """Largest gain in log-evidence that refits have shown, over the one that a quadratic predicted: 1 to `_SCALE`.
-
-        Far from its fit a quadratic errs by a share of the gain, and by the same share for effects that look alike.
-        """
-        told, ratios = self._told_by(expansion), [1.0]
-        base = told.get(frozenset(e.key for e in expansion.last.hypothesis.effects))
-        for key in self._fits:
-            if base is None or told.get(key, base) is base:
-                continue
-            predicted = told[key].weighed.log_evidence - base.weighed.log_evidence
-            every = [p.weighed.log_evidence for p in self._of_fit(key)]
-            if every and predicted > 1.0:
-                ratios.append((max(every) - base.weighed.log_evidence) / predicted)
-        return min(max(ratios), _SCALE)
-
-    def _expected(self, p: EvaluatedSet, scales: Mapping[int, float]) -> float:
-        """Log-evidence of a set without a refit if its gain is as much larger than predicted as that of other sets."""
-        own = frozenset(e.key for e in p.expansion.last.hypothesis.effects)
-        base = self._told_by(p.expansion).get(own)
-        log = p.weighed.log_evidence
-        if base is None or log < base.weighed.log_evidence:
-            return log
-        return log + (scales[id(p.expansion)] - 1.0) * (log - base.weighed.log_evidence)
 
     def _smaller(self, answer: EvaluatedSet) -> Iterator[EvaluatedSet]:
         """The sets without one of the effects of the filter, whose refits show that the answer needs each."""
@@ -390,10 +337,15 @@ class _BestFirst:
         for key in self._fits:
             for p in self._compared(key):
                 add(p)
-        for key, p in self._predicted.items():
+        for key, p in self.told.by_effects.items():
             if key not in self._fits and self._is_new(p):
                 add(p)
         return logs, evaluated
+
+
+def _first(fits: Sequence[Expansion]) -> PosteriorFit:
+    """The most probable fit of a set, under the declaration where it has one."""
+    return min((e.last for e in fits), key=lambda f: (f.hypothesis.spread is not None, f.cost))
 
 
 __all__ = ["best_first"]

@@ -60,6 +60,11 @@ class Expansion:
     counted: float = 0.0
 
     @property
+    def effects_of_fit(self) -> frozenset[str]:
+        """Keys of the effects of the fit."""
+        return frozenset(e.key for e in self.last.hypothesis.effects)
+
+    @property
     def integrated(self) -> list[int]:
         """Common parameters that an evidence integrates under their prior: derivatives, inertia, and the mounting, which shows
         beside a shift of the CG alone."""
