@@ -111,9 +111,17 @@ def searched(case: Case, options: TraceOptions, advance: Advance, kinematics: Ch
     return own
 
 
-def _with_rounds(own: Searched, required: Collection[str] = ()) -> Searched:
-    """A search with its rounds, or with those that it had where no set can be fitted."""
+def _with_rounds(
+    own: Searched, required: Collection[str] = (), among: Collection[str] | None = None
+) -> Searched:
+    """A search with its rounds, or with those that it had where no set can be fitted.
+
+    Parameters
+    ----------
+    among : keys of the errors of sensors at which the search may begin; None for those that the kinematics allows.
+    """
     case = own.case
+    starts = starts_of(own.kinematics, own.longest_period_s)
     rounds = search(
         own.sets,
         case.hypothesis,
@@ -123,7 +131,7 @@ def _with_rounds(own: Searched, required: Collection[str] = ()) -> Searched:
         case.declared,
         own.advance,
         required,
-        starts_of(own.kinematics, own.longest_period_s),
+        [one for one in starts if among is None or set(one) <= set(among)],
     )
     return replace(own, case=replace(case, fitted=own.sets.problem), rounds=rounds or own.rounds)
 
@@ -132,7 +140,8 @@ def _with_later_colour(own: Searched) -> Searched:
     """The search again with correlated noise that shows beside what it explained, where that explains more.
 
     At the declared aircraft a strong effect drives correlated noise to its limits, and it does not enter. Correlated noise can
-    imitate a share of an effect too, so that the more probable of the two answers remains.
+    imitate a share of an effect too, so that the more probable of the two answers remains. The search begins at the errors of
+    sensors that the first one named.
     """
     case, last = own.case, own.rounds[-1]
     level = later_level(sum(r.samples for r in case.fitted.records), len(case.fitted.settings.noise))
@@ -141,7 +150,7 @@ def _with_later_colour(own: Searched) -> Searched:
         return own
     start = replace(point, sizes=np.empty(0))
     slow = replace(own, case=coloured, sets=SetTable(coloured.fitted), start=start)
-    slow = _with_rounds(slow)
+    slow = _with_rounds(slow, among=[e.key for e in last.null.hypothesis.effects])
     return slow if slow.rounds and _cost(slow) < _cost(own) else own
 
 

@@ -251,10 +251,10 @@ class _BestFirst:
         expected = self.told.expected(left, refitted)
         if expected and max(expected) > least:
             following = left[int(np.argmax(expected))]
-            nearer = self.told.nearer(following, self._fits)
-            if nearer is None:
+            part = self.told.between(following, self._fits)
+            if part is None:
                 return following
-            self._predict(_first(self._fits[nearer]))
+            self.told.add(expanded(self.sets.problem, _first(self._fits[part]), self.effects), between=True)
             return self._following(best)
         logs, evaluated = self._evidence()
         answer = evaluated[simplest(normalised(logs))]

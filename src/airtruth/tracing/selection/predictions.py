@@ -34,6 +34,7 @@ class Predictions:
     def __init__(self, sets: SetTable, causes: Sequence[Cause], wrong_allowed: bool) -> None:
         self._sets, self._causes, self._wrong_allowed = sets, causes, wrong_allowed
         self._expansions: list[Expansion] = []
+        self._between: list[Expansion] = []
         self._told: dict[tuple[int, float], dict[Keys, EvaluatedSet]] = {}
         self.temper = 1.0
         self.by_effects: dict[Keys, EvaluatedSet] = {}
@@ -42,35 +43,47 @@ class Predictions:
         """The evidence of sets about a fit, under the present ratio of variances."""
         return expansion.quadratic(self._sets.problem, self._causes, self.temper, self._wrong_allowed)
 
-    def add(self, expansion: Expansion) -> None:
-        """Enter a quadratic among those that predict."""
-        self._expansions.append(expansion)
+    def add(self, expansion: Expansion, between: bool = False) -> None:
+        """Enter a quadratic among those that predict.
+
+        Parameters
+        ----------
+        between : whether its fit has not led, so that it predicts larger sets than its own alone.
+        """
+        (self._between if between else self._expansions).append(expansion)
         self.combine()
 
     def combine(self) -> None:
-        """Predict each set by the quadratic whose fit differs from it by the fewest effects; the better of two."""
+        """Predict each set by the quadratic whose fit differs from it by the fewest effects, the better of two with as many.
+
+        A part of the set that has more effects than this fit predicts it instead. What that quadratic neglects is left out.
+        """
         told = [(x.effects_of_fit, self._of(x)) for x in self._expansions]
+        parts = sorted(((x.effects_of_fit, self._of(x)) for x in self._between), key=lambda own: -len(own[0]))
         self.by_effects = {}
         for key in dict.fromkeys(key for _, every in told for key in every):
             least = min(len(own ^ key) for own, _ in told)
             by_nearest = (every.get(key) for own, every in told if len(own ^ key) == least)
-            known = [p for p in by_nearest if p is not None]
-            if known:
-                self.by_effects[key] = max(known, key=lambda p: p.weighed.log_evidence)
+            best = max((p for p in by_nearest if p is not None), key=_log_evidence, default=None)
+            if best is None:
+                continue
+            fitted = best.expansion.effects_of_fit
+            best = next((every.get(key) for own, every in parts if fitted < own < key), best)
+            if best is not None:
+                self.by_effects[key] = best
 
-    def nearer(self, p: EvaluatedSet, fitted: Collection[Keys]) -> Keys | None:
-        """The refitted set that differs from a set by fewer effects than the fit that predicts it, and has no quadratic yet.
+    def between(self, p: EvaluatedSet, fitted: Collection[Keys]) -> Keys | None:
+        """The largest refitted part of a set that has more effects than the fit that predicts the set, and no quadratic yet.
 
-        A quadratic about a distant fit promises a large effect a gain that a refit nearby may have disproved.
+        From afar a quadratic promises every set with two effects the gain that the refit of these two has disproved.
 
         Parameters
         ----------
         fitted : the sets with a refit.
         """
-        made = {x.effects_of_fit for x in self._expansions}
-        least = len(p.expansion.effects_of_fit ^ p.in_filter)
-        near = [key for key in fitted if key not in made and len(key ^ p.in_filter) < least]
-        return min(near, key=lambda key: len(key ^ p.in_filter), default=None)
+        made = {x.effects_of_fit for x in (*self._expansions, *self._between)}
+        parts = [key for key in fitted if p.expansion.effects_of_fit < key < p.in_filter and key not in made]
+        return max(parts, key=len, default=None)
 
     def expected(self, sets: Sequence[EvaluatedSet], refitted: Mapping[Keys, float]) -> list[float]:
         """Log-evidence of sets without a refit if their gain is as much larger than predicted as that of other sets.
@@ -81,7 +94,7 @@ class Predictions:
         ----------
         refitted : largest log-evidence of the refits of each set.
         """
-        scales = {id(x): self._scale(x, refitted) for x in self._expansions}
+        scales = {id(x): self._scale(x, refitted) for x in (*self._expansions, *self._between)}
         found = []
         for p in sets:
             base = self._of(p.expansion).get(p.expansion.effects_of_fit)
@@ -112,6 +125,10 @@ class Predictions:
             every.sort(key=lambda w: w.log_evidence)
             self._told[at] = {q.in_filter(w): EvaluatedSet(expansion, q, w) for w in every}
         return self._told[at]
+
+
+def _log_evidence(p: EvaluatedSet) -> float:
+    return p.weighed.log_evidence
 
 
 __all__ = ["LARGEST", "MOST_EFFECTS", "Keys", "Predictions"]
