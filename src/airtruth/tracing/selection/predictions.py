@@ -1,4 +1,4 @@
-"""What the quadratics about some fits predict of the sets of effects that have no refit."""
+"""Predictions of sets of effects that have no refit, by the quadratics about some fits."""
 
 from __future__ import annotations
 
