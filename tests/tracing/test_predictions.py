@@ -35,7 +35,7 @@ def logs(predictions):
 
 
 def test_a_refitted_part_predicts_the_sets_that_contain_it(predictions):
-    predictions.add(quadratic_about("AB", {"AB": 20.0, "ABC": 21.0, "AC": -50.0}), between=True)
+    predictions.add_part(quadratic_about("AB", {"AB": 20.0, "ABC": 21.0, "AC": -50.0}))
     told = logs(predictions)
     assert told["ABC"] == 21.0
     assert told["AC"] == 12.0, "it contains no B"
@@ -43,7 +43,7 @@ def test_a_refitted_part_predicts_the_sets_that_contain_it(predictions):
 
 
 def test_a_set_that_the_part_neglects_is_not_predicted(predictions):
-    predictions.add(quadratic_about("AB", {"AB": 20.0}), between=True)
+    predictions.add_part(quadratic_about("AB", {"AB": 20.0}))
     assert "ABC" not in logs(predictions)
 
 
@@ -62,12 +62,12 @@ def test_a_fit_that_led_predicts_what_is_nearest_to_it(predictions):
 
 def test_the_part_to_expand_has_more_effects_than_the_fit_that_predicts(predictions):
     at = predictions.by_effects[frozenset("ABC")]
-    assert predictions.between(
+    assert predictions.part_to_add(
         at, [frozenset(), frozenset("A"), frozenset("AB"), frozenset("AD")]
     ) == frozenset("AB")
-    predictions.add(quadratic_about("AB", {"AB": 20.0, "ABC": 21.0}), between=True)
+    predictions.add_part(quadratic_about("AB", {"AB": 20.0, "ABC": 21.0}))
     at = predictions.by_effects[frozenset("ABC")]
-    assert predictions.between(at, [frozenset("A"), frozenset("AB")]) is None
+    assert predictions.part_to_add(at, [frozenset("A"), frozenset("AB")]) is None
 
 
 def test_an_exchange_is_left_to_the_fit_that_led(predictions):
@@ -75,4 +75,4 @@ def test_an_exchange_is_left_to_the_fit_that_led(predictions):
     predictions.add(quadratic_about("AD", {"AD": 95.0, "ABD": 96.0, "ABC": 94.0}))
     at = predictions.by_effects[frozenset("ABD")]
     assert at.expansion.effects_of_fit == frozenset("AD")
-    assert predictions.between(at, [frozenset("A"), frozenset("AB")]) is None
+    assert predictions.part_to_add(at, [frozenset("A"), frozenset("AB")]) is None

@@ -80,7 +80,7 @@ class _BestFirst:
         self.sets, self.null, self.hypothesis = sets, null, null.hypothesis
         self.effects, self.advance = effects, advance
         causes = tuple(c for c in declared.causes if c.key not in held)
-        self.told = Predictions(sets, causes, declared.wrong_allowed)
+        self.predictions = Predictions(sets, causes, declared.wrong_allowed)
         self.is_sound = Soundness(sets.problem, null)
         self.refits = 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
@@ -98,7 +98,7 @@ class _BestFirst:
         self._reweighed()
         as_declared = self._as_declared()
         if as_declared is not None:
-            self.told.add(expanded(self.sets.problem, as_declared, self.effects))
+            self.predictions.add(expanded(self.sets.problem, as_declared, self.effects))
         self._tempered(null)
         self._predict(null)
         measured: list[PosteriorFit] = [null]
@@ -131,12 +131,12 @@ class _BestFirst:
         logs, evaluated = self._evidence()
         fits = {key: _first(every) for key, every in self._fits.items()}
         return Posterior(
-            normalised(logs), evaluated, fits, null, self.refits, self.told.temper, self.is_sound
+            normalised(logs), evaluated, fits, null, self.refits, self.predictions.temper, self.is_sound
         )
 
     def _reweighed(self) -> bool:
         """Weigh the kinematics by the present ratio of variances; whether fits were made again for it."""
-        if not self.sets.weigh_kinematics(self.told.temper):
+        if not self.sets.weigh_kinematics(self.predictions.temper):
             return False
         least = self._best().weighed.log_evidence + float(np.log(CRITERION.level))
         near = [k for k in self._fits if any(p.weighed.log_evidence > least for p in self._of_fit(k))]
@@ -145,7 +145,7 @@ class _BestFirst:
             for last in [expansion.last for expansion in self._fits.pop(key)]:
                 self._enter(self.sets.converged(last.hypothesis, last.point, near=last))
                 self.refits += 1
-        self.told.combine()
+        self.predictions.combine()
         return bool(changed)
 
     def _begin_at(self, known: Mapping[str, float]) -> None:
@@ -199,10 +199,10 @@ class _BestFirst:
         layout = fitted.layout
         rows = np.r_[layout.of.common.derivatives, layout.sizes]
         temper = float(np.mean(ratio[rows] ** 2))
-        if abs(np.log(temper / self.told.temper)) < SAME:
+        if abs(np.log(temper / self.predictions.temper)) < SAME:
             return False
-        self.told.temper = temper
-        self.told.combine()
+        self.predictions.temper = temper
+        self.predictions.combine()
         return True
 
     def _best(self) -> EvaluatedSet:
@@ -215,9 +215,9 @@ class _BestFirst:
         """The sets with some effects of the filter that their fits weigh: with each explanation of the derivatives."""
         found: list[EvaluatedSet] = []
         for expansion in self._fits[key]:
-            at = id(expansion), self.told.temper
+            at = id(expansion), self.predictions.temper
             if at not in self._read:
-                q = self.told.quadratic(expansion)
+                q = self.predictions.quadratic(expansion)
                 every = q.sets(min(LARGEST, len(key) + 1) + 1)
                 own = (w for w in every if q.in_filter(w) == key)
                 self._read[at] = [EvaluatedSet(expansion, q, w) for w in own]
@@ -234,7 +234,7 @@ class _BestFirst:
 
     def _predict(self, fitted: PosteriorFit) -> None:
         """Enter the quadratic about a fit among those that predict the other sets."""
-        self.told.add(expanded(self.sets.problem, fitted, self.effects))
+        self.predictions.add(expanded(self.sets.problem, fitted, self.effects))
 
     def _following(self, best: EvaluatedSet) -> EvaluatedSet | None:
         """The set to refit next: the best one under the prior of its own derivatives, those of one effect less, the best without
@@ -243,18 +243,20 @@ class _BestFirst:
         first = next((p for p in (best, *self._smaller(best)) if self._wants(p)), None)
         if first is not None:
             return first
-        left = [p for key, p in self.told.by_effects.items() if key not in self._fits and self._is_new(p)]
+        left = [
+            p for key, p in self.predictions.by_effects.items() if key not in self._fits and self._is_new(p)
+        ]
         least = best.weighed.log_evidence + float(np.log(CRITERION.level))
         refitted = {
             k: max(p.weighed.log_evidence for p in every) for k in self._fits if (every := self._of_fit(k))
         }
-        expected = self.told.expected(left, refitted)
+        expected = self.predictions.expected(left, refitted)
         if expected and max(expected) > least:
             following = left[int(np.argmax(expected))]
-            part = self.told.between(following, self._fits)
+            part = self.predictions.part_to_add(following, self._fits)
             if part is None:
                 return following
-            self.told.add(expanded(self.sets.problem, _first(self._fits[part]), self.effects), between=True)
+            self.predictions.add_part(expanded(self.sets.problem, _first(self._fits[part]), self.effects))
             return self._following(best)
         logs, evaluated = self._evidence()
         answer = evaluated[simplest(normalised(logs))]
@@ -337,7 +339,7 @@ class _BestFirst:
         for key in self._fits:
             for p in self._compared(key):
                 add(p)
-        for key, p in self.told.by_effects.items():
+        for key, p in self.predictions.by_effects.items():
             if key not in self._fits and self._is_new(p):
                 add(p)
         return logs, evaluated

@@ -34,7 +34,7 @@ class Predictions:
     def __init__(self, sets: SetTable, causes: Sequence[Cause], wrong_allowed: bool) -> None:
         self._sets, self._causes, self._wrong_allowed = sets, causes, wrong_allowed
         self._expansions: list[Expansion] = []
-        self._between: list[Expansion] = []
+        self._parts: list[Expansion] = []
         self._told: dict[tuple[int, float], dict[Keys, EvaluatedSet]] = {}
         self.temper = 1.0
         self.by_effects: dict[Keys, EvaluatedSet] = {}
@@ -43,14 +43,14 @@ class Predictions:
         """The evidence of sets about a fit, under the present ratio of variances."""
         return expansion.quadratic(self._sets.problem, self._causes, self.temper, self._wrong_allowed)
 
-    def add(self, expansion: Expansion, between: bool = False) -> None:
-        """Enter a quadratic among those that predict.
+    def add(self, expansion: Expansion) -> None:
+        """Enter a quadratic that may predict every set."""
+        self._expansions.append(expansion)
+        self.combine()
 
-        Parameters
-        ----------
-        between : whether its fit has not led, so that it predicts larger sets than its own alone.
-        """
-        (self._between if between else self._expansions).append(expansion)
+    def add_part(self, expansion: Expansion) -> None:
+        """Enter a quadratic that predicts only sets with all effects of its fit and more."""
+        self._parts.append(expansion)
         self.combine()
 
     def combine(self) -> None:
@@ -59,7 +59,7 @@ class Predictions:
         A part of the set that has more effects than this fit predicts it instead. What that quadratic neglects is left out.
         """
         told = [(x.effects_of_fit, self._of(x)) for x in self._expansions]
-        parts = sorted(((x.effects_of_fit, self._of(x)) for x in self._between), key=lambda own: -len(own[0]))
+        parts = sorted(((x.effects_of_fit, self._of(x)) for x in self._parts), key=lambda own: -len(own[0]))
         self.by_effects = {}
         for key in dict.fromkeys(key for _, every in told for key in every):
             least = min(len(own ^ key) for own, _ in told)
@@ -72,16 +72,17 @@ class Predictions:
             if best is not None:
                 self.by_effects[key] = best
 
-    def between(self, p: EvaluatedSet, fitted: Collection[Keys]) -> Keys | None:
+    def part_to_add(self, p: EvaluatedSet, fitted: Collection[Keys]) -> Keys | None:
         """The largest refitted part of a set that has more effects than the fit that predicts the set, and no quadratic yet.
 
-        From afar a quadratic promises every set with two effects the gain that the refit of these two has disproved.
+        A quadratic about a distant fit promises a gain to every set with two given effects, also where the refit of these two has
+        disproved it.
 
         Parameters
         ----------
         fitted : the sets with a refit.
         """
-        made = {x.effects_of_fit for x in (*self._expansions, *self._between)}
+        made = {x.effects_of_fit for x in (*self._expansions, *self._parts)}
         parts = [key for key in fitted if p.expansion.effects_of_fit < key < p.in_filter and key not in made]
         return max(parts, key=len, default=None)
 
@@ -94,7 +95,7 @@ class Predictions:
         ----------
         refitted : largest log-evidence of the refits of each set.
         """
-        scales = {id(x): self._scale(x, refitted) for x in (*self._expansions, *self._between)}
+        scales = {id(x): self._scale(x, refitted) for x in (*self._expansions, *self._parts)}
         found = []
         for p in sets:
             base = self._of(p.expansion).get(p.expansion.effects_of_fit)
